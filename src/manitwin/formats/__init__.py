@@ -1,1 +1,1 @@
-"""Files of meshes, pictures and documents: read safely, written."""
+"""Safe readers and writers of mesh, picture and document files."""

@@ -1,4 +1,4 @@
-"""Files that others wrote: only regular ones are opened, inside their folder, and no more of them is read than a limit."""
+"""Bounded reading of untrusted files: only regular files inside a given folder, up to a size limit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import BinaryIO
 from manitwin.formats.printable import printable_line
 
 Refusal = Callable[[str], Exception]
-"""Makes the error for a message: an error class of the border that reads, or a function."""
+"""Makes the error for a message: an error class of the calling module, or a function."""
 
 _NAME_CHARACTERS = 200
 _KINDS = {
@@ -24,7 +24,7 @@ _KINDS = {
 
 
 def with_remedy(refuse: Refusal, remedy: str) -> Refusal:
-    """Return a refusal whose line ends in another remedy: what stands behind the last semicolon gives way to it."""
+    """Return a refusal that replaces the remedy in a message, the text after the last semicolon."""
 
     def refused(line: str) -> Exception:
         return refuse(f"{line.rpartition('; ')[0] or line}; {remedy}")
@@ -33,18 +33,19 @@ def with_remedy(refuse: Refusal, remedy: str) -> Refusal:
 
 
 def open_regular(path: Path, refuse: Refusal, *, inside: Path | None = None, name: str | None = None) -> BinaryIO:
-    """Open a regular file for reading bytes; a pipe, device, socket or folder is refused without waiting for it.
+    """Open a regular file for reading bytes; a pipe, device, socket or folder is refused without blocking.
 
-    A link is followed where it leads to a regular file, and with ``inside`` only where that lies below this folder. ``name`` is
-    what messages call the file: its own name by default. Raises what ``refuse`` makes of one line with cause and remedy.
+    A symbolic link is followed if it leads to a regular file, and with ``inside`` only if that lies below this folder. ``name``
+    is what messages call the file (default: its own name). Raises the error that ``refuse`` makes of a line with cause and
+    remedy.
     """
     called = printable_line(path.name if name is None else name, max_characters=_NAME_CHARACTERS)
     try:
         if inside is not None and not path.resolve().is_relative_to(inside.resolve()):
             raise refuse(f"{called}: leads outside its folder, and is not read; replace the link by the file")
-        # without waiting for the other end of a pipe, and without making a terminal this process's own
+        # does not wait for the other end of a pipe, nor acquire a controlling terminal
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
-    except (OSError, ValueError, RuntimeError) as error:  # a NUL in the name; a loop of links (RuntimeError until 3.12)
+    except (OSError, ValueError, RuntimeError) as error:  # NUL in a name; loop of links (RuntimeError until 3.12)
         raise refuse(f"{called}: cannot be opened ({_cause(error)}); check the path") from error
     try:
         mode = os.fstat(descriptor).st_mode
@@ -66,9 +67,9 @@ def read_bytes(
     name: str | None = None,
     refuse_size: Refusal | None = None,
 ) -> bytes:
-    """Return the content of a regular file of at most ``limit_bytes``; opened and refused as ``open_regular`` says.
+    """Return the content of a regular file of at most ``limit_bytes``; opened and refused like ``open_regular``.
 
-    ``refuse_size`` makes the error for a file that is larger: ``refuse`` by default.
+    ``refuse_size`` makes the error for a larger file (default: ``refuse``).
     """
     called = printable_line(path.name if name is None else name, max_characters=_NAME_CHARACTERS)
     with open_regular(path, refuse, inside=inside, name=name) as stream:
@@ -85,9 +86,9 @@ def read_bytes(
 
 
 def _content(stream: BinaryIO, size: int, limit_bytes: int) -> bytes:
-    """Return the bytes of a file, up to one more than the limit: it may grow, and those of /proc say that they are empty.
+    """Return the bytes of a file, up to one more than the limit, since it may grow, and files in /proc report size 0.
 
-    Memory is asked for by the size: Python's own ``read`` would set aside as much as the limit at once.
+    Memory is allocated by the reported size; a single ``read`` would allocate the whole limit at once.
     """
     parts, left = [], limit_bytes + 1
     while left and (part := stream.read(min(left, max(size + 1, 1 << 16)))):
@@ -99,13 +100,13 @@ def _content(stream: BinaryIO, size: int, limit_bytes: int) -> bytes:
 def read_text(
     path: Path, limit_bytes: int, refuse: Refusal, *, inside: Path | None = None, name: str | None = None
 ) -> str:
-    """Return the content of a regular file of UTF-8 text, without a byte order mark; as ``read_bytes``."""
+    """Return the content of a regular UTF-8 text file, without a byte order mark; limits and errors as in ``read_bytes``."""
     content = read_bytes(path, limit_bytes, refuse, inside=inside, name=name)
     return decode_text(content, path.name if name is None else name, refuse)
 
 
 def decode_text(content: bytes, name: str, refuse: Refusal) -> str:
-    """Return UTF-8 text without a byte order mark; raises what ``refuse`` makes of one line that begins with ``name``."""
+    """Decode UTF-8 text without a byte order mark; raises the error that ``refuse`` makes of a line starting with ``name``."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

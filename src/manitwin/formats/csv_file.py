@@ -1,4 +1,4 @@
-"""CSV that others wrote: its quotes closed, its values and rows bounded. All CSV from outside the package is parsed here."""
+"""Parser of untrusted CSV with bounded rows and values; all CSV from outside the package is read here."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from manitwin.formats.printable import printable_line
 
 MAX_LINE_BYTES = 1 << 20
 MAX_COLUMNS = 512
-"""Every row is as long as the header: one of 100,000 columns makes 20,000 short rows a matter of minutes."""
+"""Every row is padded to the length of the header, so that 20,000 short rows with 100,000 columns would take minutes."""
 
 _OTHER_MARKS = {";": "semicolons", "\t": "tabs"}
 
 
 def read_csv(path: Path, refuse: Refusal, *, name: str | None = None) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the rows of a CSV file (RFC 4180) with a header, as the number of the line where each ends and its values.
+    """Yield the rows of a CSV file (RFC 4180) with a header, as the line number where each ends and its values.
 
-    A row is read as it is asked for. Raises what ``refuse`` makes of one line that names file and line: not UTF-8, a quote
-    that is not closed, semicolons or tabs between columns, a value of more than csv's 128 KiB, a line of more than
-    ``MAX_LINE_BYTES``, more than ``MAX_COLUMNS`` columns, more values than columns.
+    Rows are read lazily. Raises the error that ``refuse`` makes of a line naming file and line number: not UTF-8, an unclosed
+    quote, semicolons or tabs between columns, a value of more than csv's 128 KiB, a line of more than ``MAX_LINE_BYTES``, more
+    than ``MAX_COLUMNS`` columns, or more values than columns.
     """
     called = name or str(path)
     reader = csv.DictReader(read_lines(path, refuse, name=called), strict=True)
@@ -48,7 +48,7 @@ def read_csv(path: Path, refuse: Refusal, *, name: str | None = None) -> Iterato
 
 
 def read_lines(path: Path, refuse: Refusal, *, name: str | None = None) -> Iterator[str]:
-    """Yield the lines of a regular file of UTF-8 text with their ends; one of more than ``MAX_LINE_BYTES`` is refused."""
+    """Yield the lines of a regular UTF-8 text file with their ends; a line of more than ``MAX_LINE_BYTES`` is refused."""
     called = name or str(path)
     with open_regular(path, refuse, name=called) as stream:
         number = 0

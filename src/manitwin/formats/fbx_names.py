@@ -1,4 +1,4 @@
-"""The pictures that an FBX file names or holds, and where they lie on another machine than the one that wrote it."""
+"""Pictures that an FBX file names or embeds, including those named by paths of another machine."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Iterator
 _KEYS = (b"RelativeFilename", b"FileName")
 _OF_A_PICTURE = (b"RelativeFilenameS", b"FilenameS", b"FileNameS")
 _CONTENT = b"\x07ContentR"
-"""How the record of a picture's bytes begins in a binary file: the length of its name, its name, and that it is raw."""
+"""Start of the record of a picture's bytes in a binary file: the length of its name, its name, and the type code for raw data."""
 _LONGEST_NAME = 4096
 _LENGTH_BYTES = 4
 
 
 def fbx_file_names(data: bytes) -> Iterator[str]:
-    """Yield each name of a file in an FBX file's content, as ``beside`` has it; the same one may come again."""
+    """Yield each file name in an FBX file's content, resolved by ``beside``; names may repeat."""
     for key in _KEYS:
         at = data.find(key)
         while at >= 0:
@@ -24,7 +24,7 @@ def fbx_file_names(data: bytes) -> Iterator[str]:
 
 
 def embedded_files(data: bytes) -> dict[str, bytes]:
-    """Return the pictures that a binary FBX file holds, by the last part of the name that stands before each of them."""
+    """Return the pictures embedded in a binary FBX file, by the last part of the name that precedes each."""
     found = {}
     at = data.find(_CONTENT)
     while at >= 0:
@@ -39,9 +39,9 @@ def embedded_files(data: bytes) -> dict[str, bytes]:
 
 
 def beside(name: str) -> str:
-    """Return where a file that is named lies from the folder of the mesh.
+    """Return the path of a named file relative to the folder of the mesh.
 
-    A path of the machine that wrote it, or out of the folder, counts by its last part alone.
+    An absolute path, or one that leaves the folder, is reduced to its last part.
     """
     plain = name.replace("\\", "/")
     leads_away = plain.startswith("/") or plain[1:2] == ":" or ".." in plain.split("/")
@@ -49,7 +49,7 @@ def beside(name: str) -> str:
 
 
 def _value_at(data: bytes, at: int) -> str:
-    """Return the text behind a key: of a binary file ``S``, its length and itself, of a text one quoted behind a colon."""
+    """Return the text after a key: in a binary file ``S``, length and text; in a text file a colon and a quoted string."""
     if data[at : at + 1] == b"S":
         start = at + 1 + _LENGTH_BYTES
         length = int.from_bytes(data[at + 1 : start], "little")

@@ -1,4 +1,4 @@
-"""The unit that an FBX file says its lengths are in."""
+"""Length unit of an FBX file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NUMBERS = {b"D": "<d", b"F": "<f", b"I": "<i", b"L": "<q"}
 def fbx_unit_m(data: bytes) -> float:
     """Return the length in metres of one unit of an FBX file: its UnitScaleFactor, which is in centimetres.
 
-    It is a centimetre where the file says nothing that is a length, as for those who read it.
+    The default, also for invalid values, is one centimetre, as in other readers.
     """
     said = _binary(data)
     if said is None:
@@ -27,7 +27,7 @@ def fbx_unit_m(data: bytes) -> float:
 
 
 def _binary(data: bytes) -> float | None:
-    """Return the number behind the name and the words (its type, twice, and flags) of the property; None where there is none."""
+    """Return the number after the property's name and its words (type, label, flags); None if there is none."""
     at = data.find(_BINARY_KEY)
     if at < 0:
         return None

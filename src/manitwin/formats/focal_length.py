@@ -1,4 +1,4 @@
-"""The focal length that a photo's EXIF states, as 35 mm equivalent (EXIF 2.32, section 4.6.5)."""
+"""Focal length in a photo's EXIF, as 35 mm equivalent (EXIF 2.32, section 4.6.5)."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ FOCAL_LENGTH_MM, FOCAL_LENGTH_35MM = 0x920A, 0xA405
 WIDTH_PX, HEIGHT_PX = 0xA002, 0xA003
 PLANE_X_RESOLUTION, PLANE_UNIT = 0xA20E, 0xA210
 UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0}
-"""Of the focal plane's resolution: pixels per inch, centimetre, millimetre."""
+"""Units of the focal plane resolution, in millimetres: inch, centimetre, millimetre."""
 DIAGONAL_35MM = 43.27
 LEAST_MM, MOST_MM = 6.0, 1200.0
-"""Circular fisheyes and supertelephotos: what states less or more states no focal length (0: unknown)."""
+"""Range from circular fisheyes to supertelephotos; a value outside is invalid (0: unknown)."""
 SAME_ASPECT = 0.03
 LENS = "its EXIF states a focal length"
 
 
 def focal_length_35mm(image: Image.Image, size: tuple[int, int], findings: list[str]) -> float | None:
-    """Return the 35 mm equivalent in mm of an opened photo whose full ``size`` is (width, height); None where none is stated.
+    """Return the 35 mm equivalent in mm of an opened photo with full ``size`` (width, height); None if not stated.
 
-    Where only the lens's own focal length is stated, the focal plane's resolution says how large the sensor is. What cannot be
-    true, or is of a photo that was cropped since, is not used and said in ``findings``.
+    If only the focal length of the lens is stated, the sensor size follows from the focal plane resolution. Impossible values,
+    and values of a photo that was cropped since, are ignored with a remark in ``findings``.
     """
     try:
         stated = image.getexif().get_ifd(EXIF_IFD)
         focal_mm = _number(stated.get(FOCAL_LENGTH_35MM)) or _from_sensor(stated, size)
         taken = [_number(stated.get(tag)) for tag in (WIDTH_PX, HEIGHT_PX)]
-    except Exception as error:  # of broken EXIF Pillow raises whatever its parsing meets
+    except Exception as error:  # Pillow raises whatever its parsing of broken EXIF meets
         if not any("EXIF is broken" in finding for finding in findings):
             findings.append(f"its EXIF is broken ({type(error).__name__}): the focal length was not read")
         return None
@@ -55,7 +55,7 @@ def _from_sensor(stated: dict[int, object], size: tuple[int, int]) -> float | No
 
 
 def _number(value: object) -> float | None:
-    """Return a tag's number; None where it has none, or one that is not positive and finite."""
+    """Return the number of a tag; None if it has none, or one that is not positive and finite."""
     if not hasattr(value, "__float__"):
         return None
     number = float(value)

@@ -1,4 +1,4 @@
-"""Visual parts as a binary glTF 2.0 file, and back: the same parts give the same bytes."""
+"""Reading and writing of visual parts as binary glTF 2.0; writing is deterministic."""
 
 from __future__ import annotations
 
@@ -22,17 +22,18 @@ from manitwin.geometry.seams import close_seams, has_three_places
 
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125  # glTF 2.0, section 3.6.2.2
 _ARRAY_BUFFER, _ELEMENT_BUFFER = 34962, 34963
-_COLOR_QUALITY = 90  # visually lossless for photographs, about a fifth of a PNG
-_DATA_QUALITY = 95  # normals and roughness are numbers: coarser steps show as facets in highlights
+_COLOR_QUALITY = 90  # visually lossless for photographs, about a fifth of the size of a PNG
+_DATA_QUALITY = 95  # normals and roughness are numbers: coarser steps appear as facets in highlights
 
 
 def write_glb(parts: list[trimesh.Trimesh], *, max_texture_size: int = 2048) -> bytes:
     """Return visual parts in the object frame (Z-up, metres) as a Y-up GLB.
 
-    Keeps names, normals, texture coordinates and the PBR material of each part. Textures are scaled down to
-    ``max_texture_size`` pixels on the longer side; opaque ones become JPEG, those with an alpha that counts PNG.
-    Seams of texture and creases are closed by triangles without area (``geometry.seams``): a part that is a closed solid
-    stays one for tools that look at indices.
+    Names, normals, texture coordinates and the PBR material of each part are kept. Textures are scaled down to
+    ``max_texture_size`` pixels on the longer side; opaque ones become JPEG, those with used alpha PNG. Seams of textures and
+    creases are closed by degenerate triangles (``geometry.seams``), so that a watertight part stays watertight for tools that
+    compare indices.
+
     Source: glTF 2.0 specification, Khronos Group 2021.
     """
     document = _Document(max_texture_size)
@@ -42,16 +43,16 @@ def write_glb(parts: list[trimesh.Trimesh], *, max_texture_size: int = 2048) -> 
 
 
 def read_glb(path: Path, *, limits: MeshLimits | None = None) -> list[trimesh.Trimesh]:
-    """Read the parts of a GLB into the object frame (Z-up, metres); raises InputError as ``read_mesh`` does.
+    """Read the parts of a GLB into the object frame (Z-up, metres); raises InputError like ``read_mesh``.
 
-    Triangles without area that close seams are left out again.
+    Degenerate triangles that close seams are removed.
     """
     parts = read_gltf(MeshSource(path, limits or MeshLimits()), binary=True)
     return [bake_transform(_without_seam_faces(part), GLTF_TO_OBJECT) for part in parts]
 
 
 def pack_glb(tree: dict[str, Any], binary: bytes) -> bytes:
-    """Return a GLB container of a document and its one buffer (glTF 2.0, section 4)."""
+    """Return a GLB container of a document and its only buffer (glTF 2.0, section 4)."""
     text = json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)
     chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
@@ -61,7 +62,7 @@ def pack_glb(tree: dict[str, Any], binary: bytes) -> bytes:
 
 
 def unpack_glb(glb: bytes) -> tuple[dict[str, Any], bytes]:
-    """Return the document and the buffer of a GLB that ``pack_glb`` has made."""
+    """Return the document and the buffer of a GLB that ``pack_glb`` wrote."""
     (length,) = struct.unpack_from("<I", glb, 12)
     return json.loads(glb[20 : 20 + length]), glb[28 + length :]
 
@@ -81,7 +82,7 @@ def _without_seam_faces(part: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 class _Document:
-    """A glTF document in the making: its JSON tables and its one buffer."""
+    """A glTF document under construction: its JSON tables and its only buffer."""
 
     def __init__(self, max_texture_size: int):
         self._max_texture_size = max_texture_size
@@ -94,9 +95,10 @@ class _Document:
         self._digests: dict[str, dict[str, int]] = {}  # by mode and size
 
     def add(self, part: trimesh.Trimesh, name: str) -> None:
-        """Append a part as a mesh of one primitive under a node of its own."""
+        """Append a part as a mesh with one primitive, under its own node."""
         turned = bake_transform(part, OBJECT_TO_GLTF)
-        positions = np.asarray(turned.vertices, dtype="<f4")  # what is one place is decided as it will be read
+        # coincidence of vertices is decided in the precision of the file
+        positions = np.asarray(turned.vertices, dtype="<f4")
         source, faces = close_seams(positions, np.asarray(turned.faces))
         attributes = {
             "POSITION": self._vectors(positions[source], bounds=True),
@@ -154,7 +156,7 @@ class _Document:
         return self._append("accessors", accessor)
 
     def _indices(self, faces: np.ndarray, vertices: int) -> int:
-        # 65535 itself is the restart value of 16-bit indices
+        # 65535 is the restart value of 16-bit indices
         kind, dtype = (_UINT16, "<u2") if vertices < 65535 else (_UINT32, "<u4")
         view = self._view(np.ascontiguousarray(faces, dtype=dtype).tobytes(), _ELEMENT_BUFFER)
         return self._append(
@@ -195,11 +197,11 @@ class _Document:
         return self._known[key]
 
     def _number(self, image: Image.Image) -> int:
-        """Return the number that images of the same pixels share, which are compared only where a second has mode and size."""
+        """Return the number shared by images with equal pixels; pixels are hashed only if mode and size recur."""
         if id(image) not in self._numbers:
             number, group = len(self._numbers), f"{image.mode}:{image.size}"
             first = self._first.setdefault(group, image)
-            if first is not image:  # hashing the pixels of a scan takes longer than writing all else of it
+            if first is not image:  # hashing the pixels of a scan takes longer than writing everything else
                 known = self._digests.setdefault(group, {_digest(first): self._numbers[id(first)][1]})
                 number = known.setdefault(_digest(image), number)
             self._numbers[id(image)] = image, number
@@ -227,14 +229,14 @@ def _encoded(image: Image.Image, kind: Literal["color", "data"], with_alpha: boo
         image.save(stream, "PNG", compress_level=6)
         return stream.getvalue(), "image/png"
     quality = _COLOR_QUALITY if kind == "color" else _DATA_QUALITY
-    # no chroma subsampling: texture seams and painted vertex colours have edges that it smears
+    # no chroma subsampling, which blurs edges at texture seams and in painted vertex colours
     opaque = image if image.mode == "RGB" else image.convert("RGB")
     opaque.save(stream, "JPEG", quality=quality, subsampling=0)
     return stream.getvalue(), "image/jpeg"
 
 
 def _unit_normals(part: trimesh.Trimesh) -> np.ndarray:
-    """Return vertex normals ``(V, 3)`` that are all unit vectors, as glTF demands; +Z where no face gives one."""
+    """Return unit vertex normals ``(V, 3)``, as glTF requires; +Z where the faces define none."""
     normals = np.array(part.vertex_normals, dtype=np.float64)
     lengths = np.linalg.norm(normals, axis=1)
     normals[lengths < 1e-6] = (0.0, 0.0, 1.0)

@@ -1,8 +1,9 @@
-"""HDF5 that others wrote: a regular file whose groups and arrays lie in it, of plain numbers, and no larger than a limit.
+"""Reader of untrusted HDF5: a regular file whose groups and numeric arrays are contained in it, up to a size limit.
 
-An HDF5 file may lead out of itself by external and soft links, by arrays that are kept in other files and by virtual ones of
-other files' parts; it may ask for a filter that HDF5 loads as a plugin, hold references and objects of Python, and say of an
-array that it has 2^50 numbers of which none was written. Nothing of that is followed, loaded or made.
+An HDF5 file may refer to other files by external and soft links, external arrays and virtual data sets; request filters that
+HDF5 loads as plugins; hold references and pickled objects; and declare an array of 2^50 numbers without data. None of this is
+followed, loaded or allocated.
+
 Source: the HDF5 1.14 reference, "Property Lists" and "Filters"; h5py's low-level API.
 """
 
@@ -25,17 +26,17 @@ MAX_TEXT_BYTES = 16 << 20
 MAX_OBJECTS = 100_000
 _DEPTH = 16
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
-"""Those that are part of every HDF5 library: others are looked for in HDF5_PLUGIN_PATH and loaded."""
+"""Filters built into every HDF5 library; others would be searched in HDF5_PLUGIN_PATH and loaded."""
 
 _DEFLATE_RATIO = 1100
-"""Deflate makes no more than 1,032 bytes of one."""
+"""Upper bound of the expansion by Deflate, which is 1,032."""
 
 _FAILURES = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError, AttributeError)
-"""What h5py raises for files that are none, cut off or altered."""
+"""What h5py raises for invalid, truncated or altered files."""
 
 
 class Hdf5:
-    """An open file: arrays and texts by their paths in it, each looked at before it is read."""
+    """An open file: arrays and texts by path, each checked before it is read."""
 
     def __init__(self, path: Path, refuse: Refusal, *, remedy: str, inside: Path | None = None):
         self._called, self._refuse, self._remedy = printable_line(str(path)), refuse, remedy
@@ -44,7 +45,7 @@ class Hdf5:
             self.file = h5py.File(path, "r")
 
     def close(self) -> None:
-        """Close it."""
+        """Close the file."""
         self.file.close()
 
     def names(self, group: str = "/") -> list[str]:
@@ -58,7 +59,7 @@ class Hdf5:
             return list(found)
 
     def has(self, path: str) -> bool:
-        """Tell whether a path is there."""
+        """Return whether a path exists."""
         try:
             self._object(path)
         except KeyError:
@@ -66,7 +67,7 @@ class Hdf5:
         return True
 
     def text(self, path: str, attribute: str) -> bytes | None:
-        """Return the bytes of an attribute of one text, None where it is not there."""
+        """Return the bytes of a string attribute, None if it does not exist."""
         with self._failures(path):
             found = self._object(path)
             if attribute not in found.attrs:
@@ -88,13 +89,13 @@ class Hdf5:
             return int(self._array(path).shape[0])
 
     def size_bytes(self, path: str) -> int:
-        """Return what all arrays of a group take in memory, as ``group`` looks at them."""
+        """Return the memory size of all arrays in a group, checked like ``group``."""
         found = self.group(path)
         with self._failures(path):
             return _bytes_below(found)
 
     def group(self, path: str) -> h5py.Group:
-        """Return a group in which all is as this module reads it: it can be copied as it is."""
+        """Return a group after checking all of its content, so that it can be copied."""
         with self._failures(path):
             found = self._object(path)
             seen: set[int] = set()
@@ -121,7 +122,7 @@ class Hdf5:
                 self._look_through(found, inner, seen, depth + 1)
 
     def _object(self, path: str) -> Any:
-        """Return an object by hard links alone."""
+        """Return an object that is reachable by hard links only."""
         found: Any = self.file
         for part in filter(None, path.split("/")):
             if not isinstance(found, h5py.Group):

@@ -1,4 +1,4 @@
-"""Read a photo: any common format to upright 8-bit sRGB, or one line that says why not."""
+"""Reading of photos: common formats to upright 8-bit sRGB, or an error with cause and remedy."""
 
 from __future__ import annotations
 
@@ -21,28 +21,28 @@ from manitwin.formats.image_frames import MAX_PICTURES, count_pictures
 from manitwin.formats.printable import printable_line
 from manitwin.formats.sniff import HEIC_NOT_READ, image_format, sniff
 
-MAX_PIXELS = 178_000_000  # a little below what Pillow takes for a decompression bomb
+MAX_PIXELS = 178_000_000  # slightly below Pillow's limit for decompression bombs
 MAX_BYTES = 1 << 30
 MAX_TEXT_PIXELS = 12_000_000
-"""Of a PPM, PGM or PBM that is written as text, of which a second reads less than a million."""
+"""Limit for PPM, PGM or PBM in text form, which is decoded at less than a million pixels per second."""
 MIN_SIDE_PX = 32
-_MIN_SCALED_PX = 8  # a strip of fewer shows no object
+_MIN_SCALED_PX = 8  # a narrower strip shows no object
 _ORIENTATION = 0x0112  # EXIF
-_ON_ITS_SIDE = (5, 6, 7, 8)  # orientations in which width and height change places
-_PNM_TEXT = "ppm_plain"  # Pillow's decoder of it
+_ON_ITS_SIDE = (5, 6, 7, 8)  # orientations that swap width and height
+_PNM_TEXT = "ppm_plain"  # Pillow's decoder of text PNM
 _CAUSE_CHARACTERS = 200
 _MEGAPIXELS = f"more than {MAX_PIXELS // 1_000_000} megapixels"
 _WIDE_GREY = ("I;16", "I;16B", "I;16L", "I;16N", "I")
-_MULTI_PICTURE = ("MPO",)  # a phone's JPEG with depth map or preview behind the photo: one photo, no animation
+_MULTI_PICTURE = ("MPO",)  # a phone's JPEG with a depth map or preview after the photo: one photo, no animation
 _SUBFILE_TYPE, _REDUCED = 254, 1  # TIFF 6.0, NewSubfileType: a smaller version of another picture in the file
-_MOST_LEVELS = 16  # of a pyramid, each half as large
+_MOST_LEVELS = 16  # of a pyramid, each half as large as the previous one
 
 
 @dataclass(frozen=True)
 class Photo:
-    """``pixels (H, W, 3 or 4) uint8`` upright sRGB (RGBA where the file has transparency), and what was done to get it.
+    """A decoded photo: ``pixels (H, W, 3 or 4) uint8``, upright sRGB (RGBA with transparency).
 
-    ``focal_mm`` is the lens as 35 mm equivalent where EXIF states it believably.
+    ``findings`` list the conversions. ``focal_mm`` is the 35 mm equivalent focal length if EXIF states a plausible one.
     """
 
     pixels: np.ndarray
@@ -53,8 +53,8 @@ class Photo:
 def read_image(path: Path, *, frame: int | None = None, max_side_px: int | None = None) -> Photo:
     """Read an image file.
 
-    EXIF orientation, CMYK, embedded colour profiles, palettes and 16-bit grey are converted. ``frame`` chooses a picture of an
-    animation (counted from 0). ``max_side_px`` scales a larger photo down.
+    EXIF orientation, CMYK, embedded colour profiles, palettes and 16-bit grey are converted. ``frame`` selects a picture of an
+    animation (from 0). ``max_side_px`` scales a larger photo down.
 
     Raises InputError: ``unreadable``, ``too_large``, ``empty``, ``wrong_type``, ``too_small``, ``animated``; each names the
     file, the cause and the remedy.
@@ -83,18 +83,19 @@ def _read(path: Path, frame: int | None, max_side_px: int | None) -> Photo:
         _choose_frame(path, image, frame, findings)
         size = image.size  # a draft is smaller
         if max_side_px is not None and image.format == "JPEG":
-            image.draft(None, (max_side_px, max_side_px))  # decodes at a half, a quarter, an eighth: never smaller
+            # decodes at a half, a quarter or an eighth, never below the requested size
+            image.draft(None, (max_side_px, max_side_px))
         _decode(path, image)
         turned = _orientation(image, findings) not in (0, 1)
         focal_mm = focal_length_35mm(image, size, findings)
         profile = image.info.get("icc_profile")
-        # a copy of hundreds of megapixels only where there is something to turn
+        # copies hundreds of megapixels only if a rotation is needed
         upright = _upright(image, findings) if turned else image
         if upright is not image:
             findings.append("turned upright as its EXIF orientation says")
         try:
             rgb = _to_srgb(path, upright, profile, findings)
-        except ValueError as error:  # pixels beyond the palette
+        except ValueError as error:  # pixel values beyond the palette
             raise _refused(path, error) from error
     if max_side_px is not None and max(rgb.size) > max_side_px:
         scale = max_side_px / max(rgb.size)
@@ -110,14 +111,14 @@ def _read(path: Path, frame: int | None, max_side_px: int | None) -> Photo:
 
 
 def png_of(pixels: np.ndarray) -> bytes:
-    """Return a picture ``(H, W, 3 or 4) uint8`` as a PNG; equal pictures give equal bytes."""
+    """Encode a picture ``(H, W, 3 or 4) uint8`` as PNG, deterministically."""
     stream = io.BytesIO()
     Image.fromarray(pixels).save(stream, "PNG")
     return stream.getvalue()
 
 
 def check_header(path: Path, *, frame: int | None = None) -> None:
-    """Raise InputError for what an image's header tells already, as ``read_image`` would: its kind, its size, an animation."""
+    """Raise InputError for defects that the header of an image shows, like ``read_image``: kind, size, animation."""
     _require_image(path)
     with _opened(path) as image:
         _check_size(path, image)
@@ -125,9 +126,9 @@ def check_header(path: Path, *, frame: int | None = None) -> None:
 
 
 def full_size(path: Path) -> tuple[int, int, int]:
-    """Return the width and height of a photo, upright and not scaled, and the orientation that its EXIF states (1: none).
+    """Return width and height of a photo, upright and unscaled, and its EXIF orientation (1: none).
 
-    Raises InputError as ``check_header`` does.
+    Raises InputError like ``check_header``.
     """
     _require_image(path)
     with _opened(path) as image:
@@ -139,10 +140,10 @@ def full_size(path: Path) -> tuple[int, int, int]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Image.Image]:
-    """Open an image, of which only the header is read; what decoders warn of is no concern of a terminal."""
+    """Open an image, reading only its header; warnings of decoders are suppressed."""
     unreadable = partial(InputError, "unreadable")
     with open_regular(path, unreadable) as stream, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the limits are checked below
+        warnings.simplefilter("ignore")  # this module checks the limits itself
         if os.fstat(stream.fileno()).st_size > MAX_BYTES:
             raise _too_large(path, f"{os.fstat(stream.fileno()).st_size} bytes exceed the limit of {MAX_BYTES}")
         if (count_pictures(stream, image_format(stream.read(64)) or "") or 0) > MAX_PICTURES:
@@ -164,10 +165,10 @@ def _decode(path: Path, image: Image.Image) -> None:
 
 
 def _refused(path: Path, error: Exception) -> InputError:
-    """Return what is said of an image that a decoder fails on."""
+    """Return the error for an image that a decoder fails on."""
     if isinstance(
         error, Image.DecompressionBombError
-    ):  # raised at twice Pillow's own limit, before this module can look
+    ):  # raised at twice Pillow's own limit, before this module can check
         return _too_large(path, _MEGAPIXELS)
     if isinstance(error, MemoryError):
         return _too_large(path, "it needs more memory than is available")
@@ -188,10 +189,10 @@ def _name(path: Path) -> str:
 
 
 def _orientation(image: Image.Image, findings: list[str]) -> object:
-    """Return the orientation that EXIF states, 1 where it cannot be read: the picture itself can."""
+    """Return the EXIF orientation, 1 if EXIF is unreadable, which does not affect the picture itself."""
     try:
         return image.getexif().get(_ORIENTATION, 1)
-    except Exception as error:  # of broken EXIF Pillow raises whatever its parsing meets
+    except Exception as error:  # Pillow raises whatever its parsing of broken EXIF meets
         findings.append(f"its EXIF is broken ({type(error).__name__}) and was not read")
         return 1
 
@@ -199,7 +200,7 @@ def _orientation(image: Image.Image, findings: list[str]) -> object:
 def _upright(image: Image.Image, findings: list[str]) -> Image.Image:
     try:
         return ImageOps.exif_transpose(image)
-    except Exception as error:  # it also writes the other tags again, which may be broken
+    except Exception as error:  # it also rewrites the other tags, which may be broken
         findings.append(f"its EXIF is broken ({type(error).__name__}): it was not turned")
         return image
 
@@ -238,13 +239,13 @@ def _choose_frame(path: Path, image: Image.Image, frame: int | None, findings: l
         )
     try:
         image.seek(frame)
-    except Exception as error:  # as in _open
+    except Exception as error:  # as in _opened
         raise _refused(path, error) from error
     findings.append(f"used frame {frame} of {count}")
 
 
 def _pictures(path: Path, image: Image.Image) -> int:
-    """Return how many pictures a file has; previews and levels of a pyramid behind a TIFF's picture are no further ones."""
+    """Return the number of pictures in a file; previews and pyramid levels after a TIFF's picture do not count."""
     try:
         count = int(getattr(image, "n_frames", 1))
         if isinstance(image, TiffImagePlugin.TiffImageFile) and 1 < count <= _MOST_LEVELS:
@@ -301,7 +302,7 @@ def _apply_profile(image: Image.Image, profile: bytes, findings: list[str]) -> I
 
 
 def _scaled(image: Image.Image, size: tuple[int, int]) -> Image.Image:
-    """Scale with premultiplied alpha: colours hidden under full transparency do not bleed into the visible ones."""
+    """Scale with premultiplied alpha, so that colours under full transparency do not bleed into visible ones."""
     if image.mode != "RGBA":
         return image.resize(size, Image.Resampling.LANCZOS)
     return image.convert("RGBa").resize(size, Image.Resampling.BOX, reducing_gap=3.0).convert("RGBA")

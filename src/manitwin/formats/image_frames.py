@@ -1,4 +1,4 @@
-"""How many pictures a file holds: counted in one pass and up to a limit, where decoders would walk for hours."""
+"""Number of pictures in a file, counted in one pass up to a limit; decoders could take hours."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import struct
 from typing import BinaryIO
 
 MAX_PICTURES = 10_000
-_MAX_BLOCKS = 5_000_000  # of a GIF, 255 bytes each where they are full
+_MAX_BLOCKS = 5_000_000  # of a GIF, with at most 255 bytes each
 _GIF_EXTENSION, _GIF_IMAGE = 0x21, 0x2C  # GIF89a specification, sections 20 and 23 to 26
 
 
 def count_pictures(stream: BinaryIO, format: str) -> int | None:
-    """Return how many pictures a GIF or a TIFF holds, at most ``MAX_PICTURES`` + 1; None for what is no such file or broken.
+    """Return the number of pictures in a GIF or TIFF, at most ``MAX_PICTURES`` + 1; None for other or broken files.
 
-    The stream stays where it was.
+    The stream position is restored.
     """
     counted = {"gif": _gif_images, "tiff": _tiff_directories}.get(format)
     if counted is None:
@@ -22,14 +22,14 @@ def count_pictures(stream: BinaryIO, format: str) -> int | None:
     try:
         stream.seek(0)
         return counted(stream)
-    except (struct.error, IndexError, OSError, OverflowError):  # cut short: the decoder says so
+    except (struct.error, IndexError, OSError, OverflowError):  # truncated: the decoder reports it
         return None
     finally:
         stream.seek(place)
 
 
 def _tiff_directories(stream: BinaryIO) -> int:
-    """Count the image file directories of a TIFF (TIFF 6.0, section 2); a chain that bites its tail ends at the limit."""
+    """Count the image file directories of a TIFF (TIFF 6.0, section 2); a cyclic chain is counted once."""
     order = "<" if stream.read(4)[:2] == b"II" else ">"
     count = 0
     (offset,) = struct.unpack(f"{order}I", stream.read(4))
@@ -45,14 +45,14 @@ def _tiff_directories(stream: BinaryIO) -> int:
 
 
 def _gif_images(stream: BinaryIO) -> int:
-    """Count the image descriptors of a GIF; what follows the last whole block is not looked at."""
+    """Count the image descriptors of a GIF up to the last complete block."""
     screen = stream.read(13)
     stream.seek(_color_table_bytes(screen[10]), 1)
     images = blocks = 0
     while images <= MAX_PICTURES and (kind := stream.read(1)):
         if kind[0] == _GIF_IMAGE:
             descriptor = stream.read(9)
-            stream.seek(_color_table_bytes(descriptor[8]) + 1, 1)  # and the size of LZW codes
+            stream.seek(_color_table_bytes(descriptor[8]) + 1, 1)  # and the LZW code size
             images += 1
         elif kind[0] == _GIF_EXTENSION:
             stream.seek(1, 1)

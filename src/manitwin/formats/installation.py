@@ -1,7 +1,7 @@
-"""The installed package's version, and shared libraries that installed wheels lack with the Debian packages that have them.
+"""Version of the installed package, and system libraries that its wheels lack, with the Debian packages that provide them.
 
-The loader itself is asked (``ldd``) for every shared object and program below a folder, so that no list is kept by hand. The
-set-up script imports this before anything is installed: it wants nothing but Python.
+The loader itself (``ldd``) is queried for every shared object and program below a folder, so that no list is maintained by
+hand. The set-up script imports this module before anything is installed, so it only uses the standard library.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from typing import Any
 
 ELF = b"\x7fELF"
 NO_METADATA = "0+unknown"
-AT_A_TIME = 100  # files a call of ldd: a command line has its limits
+AT_A_TIME = 100  # files for each call of ldd: command lines are limited
 GLIB = re.compile(r"lib(glib|gobject|gio|gmodule|gthread)-2\.0\.so\.0")
-"""GLib's libraries, which Debian has in one package of a name that is none of theirs."""
+"""GLib's libraries, which Debian ships in one package with an unrelated name."""
 
 
 def installed_version() -> str:
-    """Return manitwin's version; of a source tree that was never installed, ``0+unknown``."""
-    from importlib.metadata import PackageNotFoundError, version  # 20 ms that `import manitwin` does without
+    """Return manitwin's version; ``0+unknown`` for a source tree that was never installed."""
+    from importlib.metadata import PackageNotFoundError, version  # takes 20 ms, which `import manitwin` avoids
 
     try:
         return version("manitwin")
@@ -36,10 +36,10 @@ def installed_version() -> str:
 
 
 def missing_libraries(folder: Path) -> list[str]:
-    """Return the names of the shared libraries that objects below ``folder`` want and the loader does not find, sorted.
+    """Return the sorted names of shared libraries that objects below ``folder`` need and the loader does not find.
 
-    What another file below ``folder`` provides is not missing: wheels load each other's libraries by themselves, also under
-    a longer name (``libx.so.2`` as ``libx.so.2.0.1``).
+    Libraries that another file below ``folder`` provides are not missing: wheels load each other's libraries themselves, also
+    under a longer name (``libx.so.2`` as ``libx.so.2.0.1``).
     """
     objects = list(elf_files(folder))
     bundled = {part for path in objects for part in _names_answered(path.name)}
@@ -51,33 +51,33 @@ def missing_libraries(folder: Path) -> list[str]:
 
 
 def names_shared_library(error: ImportError) -> bool:
-    """Tell whether an import failed for want of a shared library, in the loader's words (dlerror(3) of glibc)."""
+    """Return whether an import failed because of a missing shared library, by the loader's message (dlerror(3) of glibc)."""
     return "cannot open shared object file" in str(error)
 
 
 def import_remedy(error: ImportError, otherwise: str) -> str:
-    """Return the remedy of a failed import: the doctor where a shared library is missing, else what the caller knows."""
+    """Return the remedy of a failed import: the doctor for a missing shared library, else that of the caller."""
     return "manitwin doctor names the system packages that contain it" if names_shared_library(error) else otherwise
 
 
 @dataclass(frozen=True)
 class _LeftOut:
-    """Finds that a library is not installed."""
+    """Import finder that reports a library as not installed."""
 
     name: str
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
-        """Raise ModuleNotFoundError for the library; of others nothing is known here."""
+        """Raise ModuleNotFoundError for the library; other names are left to other finders."""
         if name == self.name:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 
 @contextmanager
 def left_out(name: str) -> Iterator[None]:
-    """Make imports of a library fail in the ``with`` statement as if it were not installed; one that is loaded already stays.
+    """Make imports of a library fail in the ``with`` statement as if it were not installed; a loaded one stays available.
 
-    For an optional dependency of another library that costs memory and is not used. A None in ``sys.modules`` would do for
-    Python's own imports, but modules in Cython (pyarrow) take it for the library.
+    Meant for an optional dependency of another library that costs memory and is not used. A None in ``sys.modules`` would
+    suffice for Python's own imports, but Cython modules (pyarrow) take it for the library.
     """
     finder = _LeftOut(name)
     sys.meta_path.insert(0, finder)
@@ -88,7 +88,7 @@ def left_out(name: str) -> Iterator[None]:
 
 
 class _PutOff(ModuleType):
-    """A module that is executed when something of it is asked for."""
+    """A module that is executed on the first access to an attribute."""
 
     def __getattr__(self, name: str) -> Any:
         spec = self.__spec__
@@ -103,11 +103,12 @@ class _PutOff(ModuleType):
 
 
 def put_off(name: str, *classes: str) -> None:
-    """Have a library loaded once something of it is used, not as another one imports it; what is loaded or missing stays so.
+    """Defer loading of a library until something of it is used, instead of when another one imports it.
 
-    ``classes`` are those that the other one imports for its annotations: they stand for nothing until the library is loaded.
-    For a program that owns its process, while it has one thread, and where nobody imports what is below the library before it.
-    ``importlib.util.LazyLoader`` would load at the import statement, which asks for the module's ``__spec__``.
+    A library that is loaded or missing stays so. ``classes`` are those that the other library imports for its annotations; they
+    are placeholders until the library is loaded. Meant for a program that owns its process, while it has one thread, and if
+    nothing imports submodules of the library before it. ``importlib.util.LazyLoader`` would load at the import statement, which
+    reads the module's ``__spec__``.
     """
     spec = None if name in sys.modules else find_spec(name)
     if spec is None or spec.loader is None:
@@ -120,7 +121,7 @@ def put_off(name: str, *classes: str) -> None:
 
 
 def elf_files(folder: Path) -> Iterator[Path]:
-    """Yield the shared objects and programs in the ELF format below a folder, sorted within each folder."""
+    """Yield the shared objects and programs in ELF format below a folder, sorted within each folder."""
     for place, folders, names in os.walk(folder):
         folders.sort()
         for name in sorted(names):
@@ -133,14 +134,14 @@ def elf_files(folder: Path) -> Iterator[Path]:
 
 
 def _names_answered(name: str) -> list[str]:
-    """Return the library names that a file can stand for: ``libx.so.2.0.1`` also for ``libx.so.2`` and ``libx.so``."""
+    """Return the library names that a file can provide: ``libx.so.2.0.1`` also ``libx.so.2`` and ``libx.so``."""
     base, dot_so, version = name.partition(".so")
     parts = version.split(".")
     return [base + dot_so + ".".join(parts[:count]) for count in range(1, len(parts) + 1)]
 
 
 def package_by_policy(library: str) -> str:
-    """Return the name that a Debian package of a library has by Debian Policy 8.1: libgomp.so.1 is in libgomp1; GLib's too."""
+    """Return the name of a library's package by Debian Policy 8.1: libgomp.so.1 is in libgomp1; also handles GLib."""
     if GLIB.fullmatch(library):
         return "libglib2.0-0"
     base, _, version = library.partition(".so")
@@ -150,9 +151,9 @@ def package_by_policy(library: str) -> str:
 
 
 def package_by_contents(library: str, apt_file_list: Iterable[str]) -> str | None:
-    """Return the package that holds a library, of the lines that ``apt-file search`` printed; None: none does.
+    """Return the package that contains a library, from the output lines of ``apt-file search``; None if there is none.
 
-    Of several the one with the shortest name: the others are debugging, cross-building or alternative ones.
+    Of several, it is the one with the shortest name; the others are for debugging, cross-building or alternatives.
     """
     found = set()
     for line in apt_file_list:

@@ -1,5 +1,6 @@
-"""Calls in a process of their own, where limits of time and memory hold: for bytes of outsiders, and for libraries that end
-the whole process on some broken files, as USD's does.
+"""Calls in an isolated process with limits of time and memory.
+
+They are for untrusted data, and for libraries that crash the whole process on some broken files, such as USD's.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from typing import IO, Any, TypeVar
 from manitwin.errors import Unavailable
 
 MAX_MEMORY_BYTES = 8 << 30
-"""Address space of the process, of which libraries take 2 GiB: a broken file of a kilobyte can ask for tens of them."""
+"""Address space of the process, of which libraries use 2 GiB: a broken file of a kilobyte can request tens of GiB."""
 MAX_SECONDS = 1800.0
 _START_SECONDS = 120.0
 _GRACE_SECONDS = 5
-"""Between the limit that this process keeps, and the one that the kernel keeps where this process is gone."""
+"""Difference between the limit kept by this process and that of the kernel, which acts if this process is gone."""
 _LENGTH = struct.Struct("<Q")
 _READY = "ready"
 _NOT_STARTED = "the process that reads untrusted files does not start"
@@ -43,20 +44,20 @@ _lock = threading.Lock()
 
 Argument = TypeVar("Argument")
 Answer = tuple[bool, Any]
-"""Whether a call returned, and what it returned or raised."""
+"""Whether a call returned, and the value that it returned or raised."""
 
 
 class ProcessCrashed(Exception):
-    """A call that has crashed its process."""
+    """A call crashed its process."""
 
 
 class TookTooLong(ProcessCrashed):
-    """A call that did not end within its time; its process was ended."""
+    """A call exceeded its time limit, and its process was killed."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """The seconds that a call may take, and the address space that its process may have: libraries take part of it."""
+    """Limits of a call in seconds, and of the address space of its process, part of which libraries use."""
 
     seconds: float = MAX_SECONDS
     memory_bytes: int = MAX_MEMORY_BYTES
@@ -66,11 +67,10 @@ DEFAULT_LIMITS = Limits()
 
 
 def run_isolated(function: str, *arguments: Any, limits: Limits = DEFAULT_LIMITS) -> Any:
-    """Return what ``package.module:function`` returns for arguments, in a worker process that is started once and again
-    after a crash.
+    """Return the result of ``package.module:function`` in a worker process, which is started once and again after a crash.
 
-    Arguments and result are pickled. Raises what the function raises, MemoryError for more than it may take, TookTooLong, and
-    ProcessCrashed where the process has ended.
+    Arguments and result are pickled. Raises what the function raises, MemoryError above the memory limit, TookTooLong, and
+    ProcessCrashed if the process has ended.
     """
     with _lock:
         returned, value = next(_asked(function, [arguments], limits, one_by_one=True), (False, _crashed(function)))
@@ -82,16 +82,16 @@ def run_isolated(function: str, *arguments: Any, limits: Limits = DEFAULT_LIMITS
 def iterate_isolated(
     function: str, arguments: Iterable[Argument], limits: Limits = DEFAULT_LIMITS
 ) -> Iterator[tuple[Argument, Answer]]:
-    """Yield each argument with what ``package.module:function`` returned for it or raised, in order.
+    """Yield each argument with the result or exception of ``package.module:function``, in order.
 
-    ``limits`` hold for each by itself: one that crashes, hangs or takes too much memory costs itself alone. Many at a time are
-    sent, so that 100,000 of them cost a few CPU-seconds more than in this process.
+    ``limits`` apply to each call separately: one that crashes, hangs or uses too much memory does not affect the others. Calls
+    are sent in chunks, so that 100,000 of them cost only a few CPU-seconds more than in this process.
     """
     waiting = iter(arguments)
     while chunk := list(islice(waiting, _CHUNK)):
         with _lock:
             answers = list(_asked(function, [(each,) for each in chunk], limits))
-            # of a crash nobody knows whose it was: what has no answer yet is asked for one by one
+            # the call that caused a crash is unknown, so that unanswered ones are repeated one by one
             while len(answers) < len(chunk):
                 answers += _asked(function, [(each,) for each in chunk[len(answers) :]], limits, one_by_one=True)
         yield from zip(chunk, answers, strict=True)
@@ -100,9 +100,9 @@ def iterate_isolated(
 def _asked(
     function: str, calls: list[tuple[Any, ...]], limits: Limits, *, one_by_one: bool = False
 ) -> Iterator[Answer]:
-    """Yield answers to calls until all have one, or the process ends; ``one_by_one``: then the last is of the one that did it."""
+    """Yield answers to calls until all are answered or the process ends; with ``one_by_one``, the last one is the cause."""
     mine = os.getpid()  # a forked process must not share its parent's pipes
-    if mine in _workers and not _workers[mine].alive:  # killed by somebody else since the last call
+    if mine in _workers and not _workers[mine].alive:  # killed from outside since the last call
         _workers.pop(mine).end()
     if mine not in _workers:
         _workers[mine] = _Worker()
@@ -120,16 +120,16 @@ def _asked(
     except TimeoutError:
         error = TookTooLong(f"{function} took longer than {limits.seconds:g} s")
     except BrokenPipeError:
-        pass  # as it ended before it took the call
+        pass  # it ended before it received the call
     finally:
-        if left:  # also where this process was interrupted: what comes later would be taken for another answer
+        if left:  # also after an interruption of this process: later answers would be misattributed
             _workers.pop(mine).end()
     if left and one_by_one:
         yield False, error
 
 
 def _working_folder() -> str | None:
-    """Return the folder that relative paths begin in, None where it is gone."""
+    """Return the working folder of this process, None if it no longer exists."""
     try:
         return os.getcwd()
     except OSError:
@@ -150,7 +150,7 @@ class _Worker:
                 command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,  # what a library complains of comes as an error too
+                stderr=subprocess.DEVNULL,  # errors of a library are also raised
                 bufsize=0,
             )
         except OSError as error:
@@ -173,18 +173,18 @@ class _Worker:
 
     @property
     def alive(self) -> bool:
-        """Tell whether the process still runs."""
+        """Whether the process still runs."""
         return self._process.poll() is None
 
     def send(self, value: Any) -> None:
-        """Send a value; raises BrokenPipeError where the process has ended."""
+        """Send a value; raises BrokenPipeError if the process has ended."""
         data = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
         left = memoryview(_LENGTH.pack(len(data)) + data)
         while left:
             left = left[self._to.write(left) :]
 
     def receive(self, seconds: float) -> Any:
-        """Return the next value, None where the process has ended; raises TimeoutError."""
+        """Return the next value, None if the process has ended; raises TimeoutError."""
         until = time.monotonic() + seconds
         head = self._read(_LENGTH.size, until)
         data = None if head is None else self._read(_LENGTH.unpack(head)[0], until)
@@ -205,10 +205,10 @@ class _Worker:
         return data
 
     def end(self) -> None:
-        """End the process at once."""
+        """Kill the process."""
         atexit.unregister(self.end)
         self._process.kill()
-        with contextlib.suppress(BrokenPipeError):  # what a crashed process has not taken is still to be written
+        with contextlib.suppress(BrokenPipeError):  # a crashed process leaves unwritten data
             self._to.close()
         self._from.close()
         self._process.wait()
@@ -216,18 +216,18 @@ class _Worker:
 
 def _serve() -> None:
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # nothing that a library prints may come between
+    os.dup2(2, 1)  # keeps output of libraries out of the answers
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     _send(answers, _READY)
     while (asked := _received(sys.stdin.buffer)) is not None:
         function, calls, limits, one_by_one, folder = asked
-        if folder is not None:  # relative paths are those of who asks
+        if folder is not None:  # relative paths are those of the calling process
             os.chdir(folder)
         limit_address_space(limits.memory_bytes)
         done: list[Answer] = []
         told = time.monotonic()
         for arguments in calls:
-            # the kernel's: it also ends native code that never returns, in a process whose parent was killed
+            # a kernel timer also ends native code that never returns, in a process whose parent was killed
             signal.setitimer(signal.ITIMER_REAL, limits.seconds + _GRACE_SECONDS)
             done.append(_answer(function, arguments))
             if one_by_one or time.monotonic() - told > _TELL_EVERY_SECONDS:
@@ -239,14 +239,14 @@ def _serve() -> None:
 
 
 def limit_address_space(memory_bytes: int) -> None:
-    """Bound the address space of this process: more is a MemoryError, or the end of it where native code asks."""
+    """Limit the address space of this process: beyond it, Python raises MemoryError, and native code may crash."""
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     allowed = memory_bytes if hard == resource.RLIM_INFINITY else min(memory_bytes, hard)
     resource.setrlimit(resource.RLIMIT_AS, (allowed, hard))
 
 
 def called(function: str, arguments: tuple[Any, ...]) -> Any:
-    """Return what ``package.module:function`` returns for arguments, in this process."""
+    """Return the result of ``package.module:function`` in this process."""
     module, _, name = function.partition(":")
     return getattr(import_module(module), name)(*arguments)
 
@@ -258,7 +258,7 @@ def _send(stream: IO[bytes], value: Any) -> None:
 
 
 def _received(stream: IO[bytes]) -> Any:
-    """Return the next value, None where the other side is gone."""
+    """Return the next value, None if the other side is gone."""
     head = stream.read(_LENGTH.size)
     if len(head) < _LENGTH.size:
         return None
@@ -274,11 +274,11 @@ def _answer(function: str, arguments: tuple[Any, ...]) -> Answer:
         error.add_note(traceback.format_exc())
         try:
             pickle.loads(pickle.dumps(error))
-        except Exception:  # an error that cannot be sent
+        except Exception:  # an error that cannot be pickled
             return False, RuntimeError(f"{function}:\n{traceback.format_exc()}")
         return False, error
 
 
 if __name__ == "__main__":
     _serve()
-    os._exit(0)  # who asked is gone: taking down the libraries would outlive it by a second
+    os._exit(0)  # the calling process is gone, and tearing down the libraries would take another second

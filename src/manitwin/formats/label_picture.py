@@ -1,4 +1,4 @@
-"""PNG pictures of whole numbers (ids, millimetres): 8 or 16 bits a pixel, written plainly, read without trust."""
+"""PNG pictures of integers (ids, millimetres) with 8 or 16 bits per pixel; reading is safe for untrusted files."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _MODES = {"L": np.uint8, "I;16": np.uint16}
 
 
 def label_picture(numbers: np.ndarray) -> bytes:
-    """Return numbers ``(H, W)`` of at most 65,535 as a PNG, of 8 bits where they fit; equal numbers give equal bytes."""
+    """Encode integers ``(H, W)`` of at most 65,535 as PNG, with 8 bits if they fit; deterministic."""
     wide = numbers.size > 0 and int(numbers.max()) > np.iinfo(np.uint8).max
     return bytes(cv2.imencode(".png", numbers.astype(np.uint16 if wide else np.uint8))[1].tobytes())
 
 
 def parse_label_picture(content: bytes, name: str, refuse: Refusal, *, remedy: str) -> np.ndarray:
-    """Return the numbers ``(H, W)`` of a PNG's content; raises what ``refuse`` makes of one line for anything else."""
+    """Return the integers ``(H, W)`` of a PNG; raises the error that ``refuse`` makes of a line for anything else."""
     called = printable_line(name)
     try:
         with Image.open(io.BytesIO(content), formats=("PNG",)) as picture:

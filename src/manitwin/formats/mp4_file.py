@@ -1,6 +1,6 @@
-"""MP4 files of one track of coded pictures, written as these come, and the coded pictures of an AVIF sequence.
+"""Writer of MP4 files with one track of encoded pictures, and extraction of encoded pictures from an AVIF sequence.
 
-An AVIF sequence is such a track too, under another brand: what encodes and decodes one does so for films. Sources: ISO/IEC
+An AVIF sequence is such a track under another brand, so that its encoder and decoder also serve for films. Sources: ISO/IEC
 14496-12 (ISO base media file format), section numbers below; AV1 Codec ISO Media File Format Binding 1.2 (AOMedia).
 """
 
@@ -14,19 +14,19 @@ from typing import BinaryIO
 _CONTAINERS = frozenset({b"moov", b"trak", b"mdia", b"minf", b"stbl"})
 _TICKS_A_PICTURE = 512
 _IDENTITY = struct.pack(">9i", 1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30)  # of fixed-point numbers (8.2.2)
-_ENGLISH_BY_NOBODY = 0x55C4  # the language "und", five bits a letter (8.4.2.3)
+_ENGLISH_BY_NOBODY = 0x55C4  # the language "und", five bits for each letter (8.4.2.3)
 
 
 @dataclass(frozen=True)
 class CodedPictures:
-    """Pictures as a codec has coded them, the first one by itself; ``entry`` is the sample entry that says how."""
+    """Encoded pictures, the first a key frame; ``entry`` is the sample entry that describes the coding."""
 
     entry: bytes
     samples: tuple[bytes, ...]
 
 
 def coded_pictures(sequence: bytes) -> CodedPictures:
-    """Return the coded pictures of an AVIF sequence that this process has just encoded: one track, one chunk."""
+    """Return the encoded pictures of an AVIF sequence from this process's own encoder: one track, one chunk."""
     boxes = dict(_boxes(sequence, 0, len(sequence)))
     sizes, (start,) = boxes[b"stsz"], struct.unpack_from(">I", boxes[b"stco"], 8)
     count = struct.unpack_from(">I", sizes, 8)[0]
@@ -38,7 +38,7 @@ def coded_pictures(sequence: bytes) -> CodedPictures:
 
 
 def _boxes(content: bytes, start: int, end: int) -> list[tuple[bytes, bytes]]:
-    """Return type and content of the boxes in a span, and of those in containers."""
+    """Return type and content of the boxes in a span, including those in containers."""
     found = []
     while start < end:
         size, kind = struct.unpack_from(">I4s", content, start)
@@ -51,7 +51,7 @@ def _boxes(content: bytes, start: int, end: int) -> list[tuple[bytes, bytes]]:
 
 
 class Mp4Track:
-    """Writes the pictures of a film to a stream that can seek; ``finish`` writes the index of what was added."""
+    """Writes the pictures of a film to a seekable stream; ``finish`` writes the index."""
 
     def __init__(self, stream: BinaryIO, *, width_px: int, height_px: int, rate_hz: int):
         """Begin a film; the stream is at its start, and stays open."""
@@ -61,10 +61,10 @@ class Mp4Track:
         self._chunks: list[tuple[int, int]] = []
         stream.write(_box(b"ftyp", b"isom", _u32(512), b"isom", b"iso6", b"av01", b"mp41"))
         self._media_start = stream.tell()
-        stream.write(struct.pack(">I4sQ", 1, b"mdat", 16))  # 64 bits for its size, known at the end (4.2)
+        stream.write(struct.pack(">I4sQ", 1, b"mdat", 16))  # 64-bit size, known only at the end (4.2)
 
     def add(self, pictures: CodedPictures) -> None:
-        """Append pictures of which the first can be decoded by itself; raises ValueError where they are coded in another way."""
+        """Append pictures that start with a key frame; raises ValueError if their coding differs from the previous ones."""
         if pictures.entry != (self._entry or pictures.entry):
             raise ValueError("the pictures of one track are coded in one way")
         self._entry = pictures.entry
@@ -73,14 +73,14 @@ class Mp4Track:
         self._stream.write(b"".join(pictures.samples))
 
     def finish(self) -> None:
-        """Complete the film; there is at least one picture."""
+        """Complete the film, which must have at least one picture."""
         end = self._stream.tell()
         self._stream.write(self._index())
         self._stream.seek(self._media_start + 8)
         self._stream.write(struct.pack(">Q", end - self._media_start))
 
     def _index(self) -> bytes:
-        """Return the movie box (8.2.1): no times of day, so that the same pictures make the same bytes."""
+        """Return the movie box (8.2.1), without times, so that the output is deterministic."""
         (width, height), duration = self._shape, len(self._sizes) * _TICKS_A_PICTURE
         clock = _u32(0, 0, self._rate_hz * _TICKS_A_PICTURE, duration)
         track = _box(
@@ -102,7 +102,7 @@ class Mp4Track:
         return _box(b"moov", movie, track)
 
     def _sample_table(self) -> bytes:
-        """Return where the pictures are (8.5): each chunk begins with one that is decoded by itself."""
+        """Return the sample table (8.5); each chunk begins with a key frame."""
         counts = [count for _, count in self._chunks]
         runs = [(i + 1, n) for i, n in enumerate(counts) if i == 0 or n != counts[i - 1]]
         keys = [1, *(1 + before for before in accumulate(counts[:-1]))]
@@ -118,7 +118,7 @@ class Mp4Track:
 
 
 def as_avif_sequence(film: bytes) -> bytes:
-    """Return a film of AV1 under the brand by which a decoder of AVIF knows its pictures."""
+    """Return an AV1 film under the brand that AVIF decoders expect."""
     return film[:8] + b"avis" + film[12:]
 
 
@@ -132,5 +132,5 @@ def _box(kind: bytes, *content: bytes) -> bytes:
 
 
 def _full(kind: bytes, *content: bytes, flags: int = 0) -> bytes:
-    """Return a box with a version, 0, and flags (4.2.2)."""
+    """Return a box with version 0 and flags (4.2.2)."""
     return _box(kind, _u32(flags), *content)

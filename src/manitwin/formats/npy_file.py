@@ -1,4 +1,4 @@
-"""Small whole numbers a row each in NumPy's own format: written plainly, read without trust."""
+"""One-dimensional arrays of 8-bit labels in NumPy's format; reading is safe for untrusted files."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from manitwin.formats.printable import printable_line
 MAX_LABEL_BYTES = 64 << 20
 _MAGIC = b"\x93NUMPY\x01\x00"
 _HEADER = re.compile(rb"\{'descr': '\|u1', 'fortran_order': False, 'shape': \((\d{1,9}),\), \} *\n")
-"""The one header that ``labels_to_npy`` writes (NumPy enhancement proposal 1, version 1.0)."""
+"""The only header that ``labels_to_npy`` writes (NumPy enhancement proposal 1, version 1.0)."""
 
 
 def labels_to_npy(labels: np.ndarray) -> bytes:
-    """Return labels ``(N,) uint8`` as the content of a .npy file; equal labels give equal bytes."""
+    """Return labels ``(N,) uint8`` as the content of a .npy file, deterministically."""
     stream = io.BytesIO()
     np.lib.format.write_array(stream, np.ascontiguousarray(labels, dtype=np.uint8), version=(1, 0), allow_pickle=False)
     return stream.getvalue()
 
 
 def parse_labels(content: bytes, name: str, refuse: Refusal, *, remedy: str) -> np.ndarray:
-    """Return the labels ``(N,) uint8`` of a .npy file's content; raises what ``refuse`` makes of one line.
+    """Return the labels ``(N,) uint8`` of a .npy file's content; raises the error that ``refuse`` makes of a line.
 
-    Anything but one row of bytes with as many as the header says is refused; nothing of the header is evaluated.
+    Anything but one row of as many bytes as the header states is refused, and the header is never evaluated.
     """
     called = printable_line(name)
     length = int.from_bytes(content[len(_MAGIC) : len(_MAGIC) + 2], "little")

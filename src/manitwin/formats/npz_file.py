@@ -1,4 +1,4 @@
-"""Arrays of a .npz archive, read without trust: no pickles, no more than a limit, whatever its entries claim."""
+"""Safe reader of .npz archives: no pickles, and a size limit whatever the entries claim."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _BROKEN = (
 
 
 def read_npz_array(path: Path, names: Sequence[str], limit_bytes: int, refuse: Refusal) -> np.ndarray:
-    """Return the first of the arrays ``names`` that an archive has, of at most ``limit_bytes`` unpacked.
+    """Return the first existing array of ``names`` in an archive, of at most ``limit_bytes`` unpacked.
 
-    Raises what ``refuse`` makes of one line for anything else.
+    Raises the error that ``refuse`` makes of a line for anything else.
     """
     content = read_bytes(path, limit_bytes, refuse, name=str(path))
     remedy = f"save it with numpy.savez({path.name!r}, {names[0]}=...)"
@@ -53,7 +53,7 @@ def read_npz_array(path: Path, names: Sequence[str], limit_bytes: int, refuse: R
 
 
 def npz_arrays(content: bytes, limit_bytes: int) -> dict[str, np.ndarray]:
-    """Return all arrays of an archive by name, of at most ``limit_bytes`` unpacked together; else raises ValueError."""
+    """Return all arrays of an archive by name, of at most ``limit_bytes`` unpacked in total; else raises ValueError."""
     found, left_bytes = {}, limit_bytes
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -70,7 +70,7 @@ def npz_arrays(content: bytes, limit_bytes: int) -> dict[str, np.ndarray]:
 
 
 def _array(content: bytes) -> np.ndarray:
-    """Return the array of a .npy's content, whose header may not promise more than there is; raises ValueError."""
+    """Return the array of a .npy's content, whose header must match its size; raises ValueError."""
     stream = io.BytesIO(content)
     version = np.lib.format.read_magic(stream)
     if version != (1, 0):

@@ -1,8 +1,8 @@
-"""Networks that others wrote as ONNX: bounded, all in one file, their shapes read, their nodes put in order.
+"""Reader of untrusted ONNX networks: size limits, input and output shapes, topological order of nodes.
 
-ONNX is protocol buffers (onnx.proto3, the parts without operators). Only what decides whether a network can be run is looked at:
-the graph's inputs, outputs and the names that join its nodes; weights are passed over. The standard wants nodes in topological
-order; some converters write them otherwise, and readers such as OpenCV's then refuse the file.
+ONNX is protocol buffers (onnx.proto3, the parts without operators). Only what decides whether a network can be run is parsed:
+inputs, outputs and the names that connect the nodes of the graph; weights are skipped. The standard requires nodes in
+topological order; some converters violate it, and readers such as OpenCV's then refuse the file.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _MORE = "give a network exported whole to one ONNX file"
 
 @dataclass(frozen=True)
 class OnnxTensor:
-    """An input or output: its name, element type (1 float32, 10 float16) and shape, None where it is not fixed."""
+    """An input or output: name, element type (1 float32, 10 float16), and shape with None for variable dimensions."""
 
     name: str
     element: int
@@ -35,7 +35,7 @@ class OnnxTensor:
 
 @dataclass(frozen=True)
 class OnnxFile:
-    """``content`` is what one output needs of a network, nodes in topological order; ``inputs`` leaves weights out."""
+    """A parsed network: ``content`` is the part needed for one output, nodes in topological order; ``inputs`` exclude weights."""
 
     content: bytes
     inputs: tuple[OnnxTensor, ...]
@@ -47,9 +47,9 @@ class _Broken(Exception):
 
 
 def parse_onnx(content: bytes, name: str, refuse: Refusal, *, output: str | None = None) -> OnnxFile:
-    """Take a network apart as far as is needed; ``name`` begins the line that is refused with.
+    """Parse a network as far as needed; error messages start with ``name``.
 
-    Of several outputs the one called ``output`` is kept, or the first where none is.
+    Of several outputs, the one called ``output`` is kept, or else the first.
     """
     called = printable_line(name, max_characters=200)
     try:
@@ -98,7 +98,7 @@ def _parsed(content: memoryview, wanted: str | None) -> OnnxFile:
 
 
 def _in_order(nodes: list[tuple[list[str], list[str], memoryview]], output: str) -> list[memoryview]:
-    """Return the nodes that ``output`` needs, each behind those whose outputs it takes, else as they were (Kahn 1962)."""
+    """Return the nodes that ``output`` needs in topological order, otherwise keeping their order (Kahn 1962)."""
     maker = {name: index for index, (_, outputs, _) in enumerate(nodes) for name in outputs if name}
     waits = [
         {maker[name] for name in inputs if maker.get(name, index) != index}
@@ -140,7 +140,7 @@ def _weight(tensor: memoryview) -> str:
 
 
 def _tensor(value: memoryview) -> OnnxTensor:
-    """Read a ValueInfoProto: name 1, type 2; TypeProto: tensor 1; its element 1, shape 2; dimensions 1, each a value 1."""
+    """Parse a ValueInfoProto: name 1, type 2; TypeProto: tensor 1; its element 1, shape 2; dimensions 1, each a value 1."""
     name = (_texts(value, 1) or [""])[0]
     element = 0
     shape: list[int | None] = []
@@ -165,7 +165,7 @@ def _texts(value: memoryview, wanted: int) -> list[str]:
 
 
 def _fields(data: memoryview) -> Iterator[tuple[int, int, Any, tuple[int, int]]]:
-    """Yield number, wire type, value (a number of a varint, else bytes) and place of each field of a message."""
+    """Yield number, wire type, value (an integer for a varint, else bytes) and span of each field of a message."""
     at, end, count = 0, len(data), 0
     while at < end:
         begin = at

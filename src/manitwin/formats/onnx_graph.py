@@ -1,4 +1,4 @@
-"""Neural networks written as ONNX in memory: the few messages of its protocol buffers that a graph of weights needs.
+"""Writer of ONNX networks in memory: the protocol buffer messages that a graph with weights needs.
 
 Field numbers are those of onnx.proto (IR version 8): https://github.com/onnx/onnx/blob/main/onnx/onnx.proto
 """
@@ -17,9 +17,9 @@ Attribute = float | int | str | list[int]
 
 @dataclass
 class OnnxGraph:
-    """A graph of named values: nodes in the order in which they run, and the weights that they take.
+    """A graph of named values: nodes in order of execution, and their weights.
 
-    ``input_shape`` is that of its only input, ``input_name``, of 32-bit floats or, ``whole``, of 64-bit integers.
+    ``input_shape`` is the shape of the only input, ``input_name``, of 32-bit floats or, with ``whole``, of 64-bit integers.
     """
 
     input_shape: tuple[int, ...]
@@ -29,7 +29,7 @@ class OnnxGraph:
     _weights: list[bytes] = field(default_factory=list)
 
     def weight(self, name: str, value: np.ndarray) -> str:
-        """Add a weight, as float32, or int64 where it is whole; return its name."""
+        """Add a weight as float32, or as int64 if it has an integer type; return its name."""
         whole = np.issubdtype(value.dtype, np.integer)
         raw = np.ascontiguousarray(value, "<i8" if whole else "<f4").tobytes()
         dims = b"".join(_number(1, side) for side in value.shape)
@@ -37,14 +37,14 @@ class OnnxGraph:
         return name
 
     def node(self, operator: str, inputs: list[str], output: str, **attributes: Attribute) -> str:
-        """Add a node of one output; return the output's name."""
+        """Add a node with one output; return the name of the output."""
         names = b"".join(_text(1, name) for name in inputs) + _text(2, output)
         said = b"".join(_bytes(5, _attribute(name, value)) for name, value in attributes.items())
         self._nodes.append(names + _text(3, output) + _text(4, operator) + said)
         return output
 
     def to_bytes(self, output: str, shape: tuple[int, ...]) -> bytes:
-        """Return the model, whose only output is a value of this shape."""
+        """Return the model with the given value, of this shape, as its only output."""
         graph = b"".join(_bytes(1, node) for node in self._nodes) + _text(2, "graph")
         graph += b"".join(_bytes(5, weight) for weight in self._weights)
         graph += _bytes(11, _value(self.input_name, self.input_shape, _INT64 if self.whole else _FLOAT)) + _bytes(
@@ -70,7 +70,7 @@ def _attribute(name: str, value: Attribute) -> bytes:
 
 def _varint(value: int) -> bytes:
     content = bytearray()
-    value &= (1 << 64) - 1  # a negative number is its two's complement
+    value &= (1 << 64) - 1  # a negative number is written as two's complement
     while value > 0x7F:
         content.append(value & 0x7F | 0x80)
         value >>= 7

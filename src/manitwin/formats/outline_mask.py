@@ -1,4 +1,4 @@
-"""Read the picture of a thing's outline beside a photo: white, or opaque, where the thing is."""
+"""Reader of an object mask beside a photo: white, or opaque, where the object is."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from manitwin.formats.image_file import full_size, read_image
 from manitwin.formats.printable import printable_line
 
 MOST_TINT = 64
-"""By which the colour of what is not black differs within a mask at most, of 255: what compresses with losses tints it."""
+"""Largest difference between the colour channels of bright pixels, of 255: lossy compression tints a mask."""
 LEAST_LEFT_OUT = 0.02
-"""Of a picture, what the mask of a thing leaves out at least: less is no cut-out (as of an alpha channel)."""
+"""Least share of a picture that a mask must exclude; less is no cut-out (as for alpha channels)."""
 _HALF = 0.5
 LEAST_OF_LEVEL = 0.05
-"""Of what is not black, the share of one level that is no smooth edge."""
+"""Share of the non-black pixels at one level from which on it cannot be a smooth edge."""
 LOSSES, FEW = 0.1, 16
-"""By which levels are off where a picture is scaled or compressed with losses, of the main one; below ``FEW`` none is."""
-_TURNED = {6: -1, 8: 1}  # quarter turns, counter-clockwise, that show a stored picture upright
+"""Relative deviation of levels by scaling or lossy compression, of the main level; not tolerated below ``FEW`` levels."""
+_TURNED = {6: -1, 8: 1}  # counter-clockwise quarter turns that make a stored picture upright
 
 _refused = partial(InputError, "unreadable")
 
 
 def require_mask(path: Path, folder: Path | None, size_px: tuple[int, int], orientation: int) -> None:
-    """Raise InputError for a mask that is not there, lies outside a ``folder``, or is not as large as its photo.
+    """Raise InputError for a mask that does not exist, lies outside ``folder``, or differs in size from its photo.
 
-    ``size_px`` is the photo's width and height, upright; a mask of the photo as it is stored is one, too, where its EXIF
-    ``orientation`` turns it by a right angle. Only the header is read.
+    ``size_px`` is the width and height of the upright photo. A mask of the photo as stored is also accepted if its EXIF
+    ``orientation`` is a quarter turn. Only the header is read.
     """
     called = _called(path)
     try:
@@ -51,12 +51,12 @@ def require_mask(path: Path, folder: Path | None, size_px: tuple[int, int], orie
 
 
 def read_mask(path: Path, shape: tuple[int, int], orientation: int = 1) -> np.ndarray:
-    """Return how far each pixel of a photo of ``shape`` (rows, columns), upright, is the thing's: ``(H, W) uint8``, 255 wholly.
+    """Return the mask of a photo of ``shape`` (rows, columns), upright: ``(H, W) uint8``, 255 for pixels of the object.
 
-    An alpha channel that differs within the picture is the mask, else its brightest channel, stretched until the highest is 255.
-    ``orientation`` is that of the photo's EXIF: a mask of the other shape is turned as the photo is. Raises InputError for a
-    picture that is no outline: one with several colours, one that numbers several things, one that is the same nearly
-    everywhere, and one that has most of the border (it says what to leave out of a scene).
+    The mask is an alpha channel that is not constant, or else the brightest channel, stretched to a maximum of 255.
+    ``orientation`` is that of the photo's EXIF: a mask of the transposed shape is rotated like the photo. Raises InputError for
+    a picture that is no object mask: one with several colours, one that numbers several objects, one that is nearly constant,
+    and one that covers most of the border (a mask of what to exclude from a scene).
     """
     pixels, called = read_image(path).pixels, _called(path)
     if pixels.shape[2] == 4 and np.ptp(pixels[..., 3]):
@@ -89,7 +89,7 @@ def read_mask(path: Path, shape: tuple[int, int], orientation: int = 1) -> np.nd
 
 
 def _spread_of_colour(pixels: np.ndarray, mask: np.ndarray) -> float:
-    """Return by how much the channels differ among what is bright, of 255, where each pixel's brightest channel is made 255."""
+    """Return the largest difference of the channels among bright pixels, of 255, after scaling their brightest channel to 255."""
     bright = mask > mask.max() * _HALF
     if not bright.any():
         return 0.0
@@ -98,7 +98,7 @@ def _spread_of_colour(pixels: np.ndarray, mask: np.ndarray) -> float:
 
 
 def _require_one_thing(mask: np.ndarray, called: str) -> None:
-    """Raise InputError for a picture of which several levels each cover an area: a map of several things, numbered."""
+    """Raise InputError for a picture with areas at several levels: a map of several numbered objects."""
     counts = np.bincount(mask.ravel(), minlength=256)
     counts[0] = 0
     levels = np.flatnonzero(counts)

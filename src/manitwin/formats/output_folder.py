@@ -1,4 +1,4 @@
-"""A folder to write into: asked before any work whether it can be made and written, and written whole or not at all."""
+"""Output folders: an early check that they can be made and written, and atomic writing."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from manitwin.errors import UsageError
 
 
 def require_writable_folder(folder: Path, what: str = "") -> None:
-    """Raise UsageError where a folder is none, or cannot be made or written; it is not made.
+    """Raise UsageError if a path is no folder, or cannot be made or written; the folder is not made.
 
-    ``what`` is to be written, for the message. One that is there is left as it is, its times too.
+    ``what`` names what is to be written, for the message. An existing folder is left unchanged, including its times.
     """
     remedy = f"give a folder to write{f' {what}' if what else ''} into"
     try:
@@ -31,21 +31,21 @@ def require_writable_folder(folder: Path, what: str = "") -> None:
                 raise UsageError(f"{folder}: {_named(place, folder)}a link that leads nowhere; {remedy}")
     except OSError as error:
         raise UsageError(f"{folder}: cannot be written ({error.strerror or error}); {remedy}") from error
-    except ValueError as error:  # a NUL in it
+    except ValueError as error:  # a NUL in the path
         raise UsageError(f"{folder}: no path ({error}); {remedy}") from error
 
 
 def require_new_folder(out: Path) -> None:
-    """Raise UsageError where a folder is there and has something in it."""
+    """Raise UsageError if a folder exists and is not empty."""
     if out.exists() and any(out.iterdir()):
         raise UsageError(f"{out}: is there and not empty; give a new folder")
 
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
-    """Give a folder to write into, which becomes ``out`` at the end; of a failure nothing stays.
+    """Yield a folder to write into, which is renamed to ``out`` at the end, or removed after a failure.
 
-    Raises UsageError where ``out`` is there and has something in it.
+    Raises UsageError if ``out`` exists and is not empty.
     """
     require_new_folder(out)
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -62,16 +62,16 @@ def new_folder(out: Path) -> Iterator[Path]:
 
 
 def _require_names(folder: Path, there: Path) -> None:
-    """Raise OSError where a name that is to be made is longer than its file system takes."""
+    """Raise OSError if a name to be made is longer than the file system allows."""
     longest = os.pathconf(there, "PC_NAME_MAX") - len(
         ".manitwin-12345.replaced"
-    )  # what is written stands beside it first
+    )  # files are written beside their final place first
     if any(len(os.fsencode(name)) > longest for name in folder.absolute().parts[len(there.absolute().parts) :]):
         raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
 
 
 def _try(place: Path, *, made: bool) -> None:
-    """Raise OSError where a folder cannot be written; ``made``: where none can be made in it (/proc)."""
+    """Raise OSError if a folder cannot be written; ``made``: or if no folder can be made in it (/proc)."""
     if made:
         os.rmdir(tempfile.mkdtemp(prefix=".manitwin-", dir=place))
     elif not os.access(place, os.W_OK | os.X_OK):

@@ -1,4 +1,4 @@
-"""An input as a twin keeps it: one file byte for byte, or an archive of all its files; copied block by block."""
+"""Copy of an input that a twin keeps: a single file unchanged, or an archive of all its files, copied in blocks."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import side_files
 
 MAX_KEPT_BYTES = 4 << 30
-"""An input of more bytes is told and not kept: readers refuse it, and a sparse file would fill the disk."""
+"""Larger inputs are only described: readers refuse them, and a sparse file would fill the disk."""
 REFERENCE = "source.txt"
-"""What stands for an input that is not kept."""
+"""File that describes an input that is not kept."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date of a ZIP entry: equal inputs give equal archives
 _BLOCK_BYTES = 1 << 20
 
@@ -26,12 +26,12 @@ _BLOCK_BYTES = 1 << 20
 def pack_source(
     path: Path, folder: Path, beside: Iterable[Path] = (), *, keep: bool = True, mask: Path | None = None
 ) -> tuple[str, str]:
-    """Write into a folder what a twin keeps of its input; return the name there and its sha256.
+    """Write into a folder what a twin keeps of its input; return the file name and its sha256.
 
-    A single file is kept byte for byte; a mesh with side files, or with others ``beside`` it in its folder, as an archive of
-    all of them, uncompressed, undated. Of more than ``MAX_KEPT_BYTES`` a text says the names and sizes; so it does without
-    ``keep``, with the digest of each file. The ``mask`` of a photo lies beside what is kept, as ``mask_name`` calls it. Raises
-    InputError ``unreadable`` for a file that is gone or no regular one.
+    A single file is kept unchanged; a mesh with side files, or with further files ``beside`` it, as an uncompressed, undated
+    archive of all of them. For more than ``MAX_KEPT_BYTES``, a text lists names and sizes; without ``keep``, it also lists the
+    digest of each file. The ``mask`` of a photo is stored beside it under ``mask_name``. Raises InputError ``unreadable`` for a
+    file that does not exist or is not regular.
     """
     others = sorted({*side_files(path), *(other.resolve() for other in beside)})
     root = path.parent.resolve()
@@ -45,39 +45,39 @@ def pack_source(
 
 
 def photo_names(paths: Sequence[Path]) -> list[str]:
-    """Return what photos of one thing are called in the archive that is kept of them."""
+    """Return the names of several photos of one object in their archive."""
     return [f"photo_{number:02d}{path.suffix.lower()}" for number, path in enumerate(paths)]
 
 
 def mask_names(paths: Sequence[Path]) -> list[str]:
-    """Return what the masks of photos are called in that archive."""
+    """Return the names of the photos' masks in that archive."""
     return [f"mask_{number:02d}{path.suffix.lower()}" for number, path in enumerate(paths)]
 
 
 def masks_beside(masks: Sequence[str]) -> dict[str, Path]:
-    """Return the masks of photos, one a photo, '' where it has none, by what they are called there: mask_02 is photo_02's."""
+    """Return the masks of photos by their archive names, mask_02 for photo_02; ``masks`` has '' for a photo without one."""
     return {f"mask_{number:02d}{Path(mask).suffix.lower()}": Path(mask) for number, mask in enumerate(masks) if mask}
 
 
 def mask_name(mask: Path) -> str:
-    """Return what the mask of one photo is called beside it."""
+    """Return the name of a single photo's mask beside it."""
     return f"source_mask{mask.suffix.lower()}"
 
 
 def pack_photos(
     paths: Sequence[Path], folder: Path, *, keep: bool = True, beside: Mapping[str, Path] | None = None
 ) -> tuple[str, str]:
-    """Write photos of one thing into a folder as ``source.zip``, numbered in their order; return its name and sha256.
+    """Write photos of one object into a folder as ``source.zip``, numbered in order; return its name and sha256.
 
-    ``beside`` are further files, by what they are called there. Of more than ``MAX_KEPT_BYTES``, or without ``keep``, a text
-    stands for them as for other inputs. Raises InputError ``unreadable`` for a file that is gone.
+    ``beside`` are further files by archive name. For more than ``MAX_KEPT_BYTES``, or without ``keep``, a text describes them
+    as for other inputs. Raises InputError ``unreadable`` for a file that does not exist.
     """
     files = dict(zip(photo_names(paths), paths, strict=True)) | dict(beside or {})
     return _packed(files, folder, None, keep)
 
 
 def _packed(files: Mapping[str, Path], folder: Path, single: Path | None, keep: bool) -> tuple[str, str]:
-    """Keep files by their names in an archive, or one byte for byte."""
+    """Store files by name in an archive, or a single one unchanged."""
     sizes = {called: _size(file) for called, file in files.items()}
     if sum(sizes.values()) > MAX_KEPT_BYTES:
         name = REFERENCE
@@ -128,5 +128,5 @@ def _size(file: Path) -> int:
 
 
 def _name_in(root: Path, file: Path, name: str) -> str:
-    """Return a file's path below the input's folder; of an input that is a link out of it, the link's name."""
+    """Return a file's path below the input's folder; for an input that is a link out of it, the name of the link."""
     return file.relative_to(root).as_posix() if file.is_relative_to(root) else name

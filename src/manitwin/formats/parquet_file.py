@@ -1,8 +1,8 @@
-"""Parquet that others wrote: a regular file, its columns of the types that they should be, no larger in memory than a limit.
+"""Reader of untrusted Parquet: a regular file with columns of the expected types, within a memory limit.
 
-All Parquet from outside the package is opened here: by ``open_parquet``, or, before DuckDB or pyarrow's data sets read it, looked
-at by ``check_parquet``. A footer may lie about sizes and a dictionary may repeat a long text a million times, so that pages are
-held against the limit by their own headers, and texts by their lengths before they are unfolded.
+All Parquet from outside the package is opened by ``open_parquet``, or checked by ``check_parquet`` before DuckDB or pyarrow's
+data sets read it. A footer may state false sizes, and a dictionary may repeat a long text a million times; therefore pages are
+checked against the limit by their own headers, and texts by their lengths before they are expanded.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ MAX_COLUMNS = 4096
 MAX_BYTES = 1 << 30
 _CAUSE_CHARACTERS = 160
 _FAILURES = (pa.ArrowException, OSError, MemoryError, OverflowError, ValueError, KeyError, IndexError, RecursionError)
-"""What pyarrow raises for files that are none, cut off, altered, or of codecs and encodings that it has not."""
+"""What pyarrow raises for files that are invalid, truncated, altered, or have unsupported codecs and encodings."""
 
 
 @dataclass
 class _Unreadable:
-    """Makes the one line that says why a file cannot be read, and what to do."""
+    """Makes the one-line error with the reason why a file cannot be read, and a remedy."""
 
     called: str
     refuse: Refusal
@@ -43,7 +43,7 @@ class _Unreadable:
 
     @contextmanager
     def failures(self) -> Iterator[None]:
-        """Turn what pyarrow raises into the one line; errors of this package pass."""
+        """Convert exceptions of pyarrow to the one-line error; errors of this package pass through."""
         try:
             yield
         except _FAILURES as error:
@@ -51,7 +51,7 @@ class _Unreadable:
 
 
 class ParquetTable:
-    """An open Parquet file whose footer, columns and pages have been looked at; read by row groups or whole."""
+    """An open Parquet file with checked footer, columns and pages; read as a whole or by row groups."""
 
     def __init__(self, file: pq.ParquetFile, unreadable: _Unreadable, max_bytes: int):
         self._file, self._unreadable, self._max_bytes = file, unreadable, max_bytes
@@ -61,7 +61,7 @@ class ParquetTable:
         self.metadata: dict[bytes, bytes] = file.schema_arrow.metadata or {}
 
     def read(self, columns: Sequence[str] | None = None, *, row_group: int | None = None) -> pa.Table:
-        """Return rows, all or of one row group, with their own types; no extension type is made."""
+        """Return the rows, all or of one row group, with plain types; no extension type is created."""
         with self._unreadable.failures():
             groups = None if row_group is None else [row_group]
             names = self.names if columns is None else list(columns)
@@ -72,11 +72,11 @@ class ParquetTable:
             )
             self._hold_texts(table)
             plain = table.cast(_plain(table.schema))
-            plain.validate(full=True)  # that texts are UTF-8: pyarrow itself looks only where one is asked for
+            plain.validate(full=True)  # checks that texts are UTF-8, which pyarrow otherwise does only on access
             return plain
 
     def _hold_texts(self, table: pa.Table) -> None:
-        """Refuse texts that unfold to more than the limit."""
+        """Refuse texts that expand to more than the limit."""
         for name, column in zip(table.column_names, table.columns, strict=True):
             total = sum(_unfolded_bytes(chunk) for chunk in column.chunks)
             if total > self._max_bytes:
@@ -97,11 +97,11 @@ def open_parquet(
     inside: Path | None = None,
     name: str | None = None,
 ) -> Iterator[ParquetTable]:
-    """Open a regular Parquet file, or a stream of one; what of it is read later is bounded.
+    """Open a regular Parquet file, or a stream of one, for bounded reading.
 
-    With ``schema`` it has all these columns but for ``optional`` ones, of these types; more are let be. Only ``columns`` (None:
-    those of the schema, or all) are looked at, and may be read. Raises what ``refuse`` makes of one line, which ends in the
-    remedy.
+    With ``schema``, the file must have all its columns except ``optional`` ones, with these types; further columns are ignored.
+    Only ``columns`` (None: those of the schema, or all) are checked and may be read. Raises the error that ``refuse`` makes of
+    a line ending in the remedy.
     """
     called = name or str(path)
     stream = (
@@ -119,8 +119,8 @@ def open_parquet(
             _check_pages(stream, footer, wanted, unreadable, max_bytes)
             stream.seek(0)
             texts = [".".join(leaf.path) for leaf in footer.leaves if leaf.is_text]
-            # without threads of pyarrow's own, here and in read: one that lets go of the Python stream while the interpreter
-            # ends takes the process down, "terminate called without an active exception" (apache/arrow#34314)
+            # without threads of pyarrow here and in read: one that releases the Python stream while the interpreter ends aborts
+            # the process with "terminate called without an active exception" (apache/arrow#34314)
             file = pq.ParquetFile(stream, read_dictionary=texts, arrow_extensions_enabled=False, pre_buffer=False)
             if schema is not None:
                 _check_types(file.schema_arrow, schema, wanted or schema.names, unreadable)
@@ -137,13 +137,13 @@ def read_parquet(
     inside: Path | None = None,
     name: str | None = None,
 ) -> pa.Table:
-    """Return the rows of a file as ``open_parquet`` opens it: with ``schema`` its columns alone, in its order."""
+    """Return the rows of a file, opened like ``open_parquet``; with ``schema``, only its columns, in its order."""
     with open_parquet(path, refuse, schema=schema, columns=columns, remedy=remedy, inside=inside, name=name) as file:
         return file.read(columns if columns is not None else None if schema is None else schema.names)
 
 
 def check_parquet(path: Path, refuse: Refusal, *, schema: pa.Schema | None = None, remedy: str, **options: Any) -> int:
-    """Look at a file that another library is to read, as ``open_parquet`` does; returns its number of rows."""
+    """Check a file that another library is to read, like ``open_parquet``; return its number of rows."""
     with open_parquet(path, refuse, schema=schema, remedy=remedy, **options) as file:
         return file.rows
 
@@ -162,7 +162,7 @@ def _check_footer(footer: Footer, columns: Sequence[str] | None, unreadable: _Un
 def _check_pages(
     stream: BinaryIO, footer: Footer, columns: Sequence[str] | None, unreadable: _Unreadable, max_bytes: int
 ) -> None:
-    """Hold what each row group unfolds to against the limit, by the headers of its pages."""
+    """Check the expanded size of each row group against the limit, by the headers of its pages."""
     for rows, chunks in footer.row_groups:
         total = 0
         for leaf, chunk in zip(footer.leaves, chunks, strict=True):
@@ -185,7 +185,7 @@ def _check_types(found: pa.Schema, schema: pa.Schema, columns: Sequence[str], un
 
 
 def _plain(schema: pa.Schema) -> pa.Schema:
-    """Return a schema whose texts are read as texts, not as dictionaries."""
+    """Return a schema with plain text types in place of dictionaries."""
     return pa.schema([field.with_type(_plain_type(field.type)) for field in schema], metadata=schema.metadata)
 
 
@@ -198,7 +198,7 @@ def _plain_type(kind: pa.DataType) -> pa.DataType:
 
 
 def _unfolded_bytes(array: pa.Array) -> int:
-    """Return the bytes of an array's texts once its dictionaries are unfolded."""
+    """Return the size of an array's texts after expanding its dictionaries."""
     if pa.types.is_list(array.type):
         return _unfolded_bytes(array.flatten())
     if not pa.types.is_dictionary(array.type):

@@ -1,8 +1,8 @@
-"""The structure of a Parquet file, footer and page headers, read here alone: a library that is given false ones may crash.
+"""Parser of a Parquet file's footer and page headers, which libraries may crash on if they are false.
 
 Source: the format's parquet.thrift (FileMetaData, SchemaElement, RowGroup, ColumnMetaData, PageHeader) and the specification of
-Thrift's compact protocol (doc/specs/thrift-compact-protocol.md). pyarrow 26 ends the process where a row group has fewer columns
-than the schema.
+Thrift's compact protocol (doc/specs/thrift-compact-protocol.md). pyarrow 26 crashes the process if a row group has fewer
+columns than the schema.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any, BinaryIO
 MAGIC = b"PAR1"
 MAX_FOOTER_BYTES = 64 << 20
 _HEADER_BYTES = 1 << 16
-"""A page's header is some tens of bytes; with statistics of long texts some thousand."""
+"""A page header has some tens of bytes; with statistics of long texts, some thousands."""
 
 _BYTE_ARRAY = 6
 _WIDTHS = {0: 1, 1: 4, 2: 8, 3: 12, 4: 4, 5: 8, _BYTE_ARRAY: 4}
-"""Bytes of a value by its physical type; texts are first read as indices of their dictionaries."""
+"""Bytes for each value by physical type; texts are first read as dictionary indices."""
 
 _STOP, _TRUE, _FALSE, _BYTE, _DOUBLE, _BINARY, _LIST, _SET, _STRUCT = 0, 1, 2, 3, 7, 8, 9, 10, 12
 _INTEGERS = (4, 5, 6)
@@ -28,12 +28,12 @@ _DEPTH = 16
 
 
 class BadStructure(ValueError):
-    """A footer or header that is none, or that contradicts itself or the file."""
+    """A footer or header that is invalid, or contradicts itself or the file."""
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """A column of the schema that holds values: its ``path`` from the column of the table on."""
+    """A schema column that holds values; ``path`` starts with the column of the table."""
 
     path: tuple[str, ...]
     physical_type: int
@@ -41,7 +41,7 @@ class Leaf:
 
     @property
     def column(self) -> str:
-        """The table's column that it belongs to."""
+        """The column of the table to which it belongs."""
         return self.path[0]
 
     @property
@@ -52,7 +52,7 @@ class Leaf:
 
 @dataclass(frozen=True)
 class Chunk:
-    """The bytes of a leaf in a row group."""
+    """The byte range of a leaf in a row group."""
 
     start: int
     length: int
@@ -60,7 +60,7 @@ class Chunk:
 
 @dataclass(frozen=True)
 class Footer:
-    """``row_groups``: how many rows each has, and its chunks in the order of the leaves."""
+    """A parsed footer; ``row_groups`` gives the number of rows of each, and its chunks in the order of the leaves."""
 
     rows: int
     leaves: tuple[Leaf, ...]
@@ -69,7 +69,7 @@ class Footer:
 
 @dataclass(frozen=True)
 class Page:
-    """What a page's header says of it."""
+    """Sizes that a page header states."""
 
     values: int
     uncompressed_bytes: int
@@ -111,7 +111,7 @@ def _leaves(elements: list[Any]) -> tuple[Leaf, ...]:
                 below(name, inner, depth + 1)
             else:
                 kind = _size(element.get(1))
-                width = _WIDTHS.get(kind) or _size(element.get(2))  # the last type has its length here
+                width = _WIDTHS.get(kind) or _size(element.get(2))  # for the last type, its length is stored here
                 leaves.append(Leaf(name, kind, width))
 
     below((), _size(_struct(elements[0]).get(5, 0)) if elements else 0, 0)
@@ -135,7 +135,7 @@ def _chunk(column: Any, leaf: Leaf, rows: int, end: int) -> Chunk:
     if tuple(map(_text, _list(about, 3))) != leaf.path or about.get(1) != leaf.physical_type:
         raise BadStructure(f"the column {'.'.join(leaf.path)} is not where its schema has it")
     _size(about.get(5))
-    # a dictionary stands before the data; files of before 2.0 of Arrow say 0 where there is none
+    # a dictionary precedes the data; files of Arrow before 2.0 state 0 if there is none
     start = min(_size(about.get(9)), _size(about.get(11)) or end if 11 in about else end)
     length = _size(about.get(7))
     if rows and (start < 4 or start + length > end):
@@ -144,7 +144,7 @@ def _chunk(column: Any, leaf: Leaf, rows: int, end: int) -> Chunk:
 
 
 def pages_of(stream: BinaryIO, chunk: Chunk) -> Iterator[Page]:
-    """Yield the pages of a chunk; only their headers are read. Raises BadStructure."""
+    """Yield the pages of a chunk, reading only their headers. Raises BadStructure."""
     place, end = chunk.start, chunk.start + chunk.length
     while place < end:
         stream.seek(place)
@@ -186,7 +186,7 @@ def _text(said: Any) -> str:
 
 
 class _Compact:
-    """Read a struct of Thrift's compact protocol: numbers, texts, lists and structs by the numbers of their fields."""
+    """Parser of a struct in Thrift's compact protocol: numbers, texts, lists and structs by field number."""
 
     def __init__(self, content: bytes):
         self.content, self.place = content, 0
@@ -209,7 +209,7 @@ class _Compact:
         return self.content[self.place - 1]
 
     def _varint(self) -> int:
-        if self.place < len(self.content) and (byte := self.content[self.place]) < 128:  # most are that short
+        if self.place < len(self.content) and (byte := self.content[self.place]) < 128:  # most are this short
             self.place += 1
             return byte
         value = shift = 0
@@ -252,6 +252,6 @@ class _Compact:
     def _values(self, depth: int) -> list[Any]:
         head = self._byte()
         count = head >> 4 if head >> 4 < 15 else self._varint()
-        if count > len(self.content) - self.place or depth > _DEPTH:  # each takes a byte at least
+        if count > len(self.content) - self.place or depth > _DEPTH:  # each value takes at least a byte
             raise BadStructure("its structure is cut off")
         return [self._value(head & 15, depth, in_list=True) for _ in range(count)]

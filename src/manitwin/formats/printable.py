@@ -1,4 +1,4 @@
-"""Text of outsiders as a terminal and a log may show it."""
+"""Escaping of untrusted text for terminals and logs."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _INVISIBLE = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 
 
 def printable(text: str, *, max_characters: int | None = None) -> str:
-    r"""Return text with what a terminal would obey or hide written out, as ``\x1b`` and ``\u202e``; ends of lines and tabs stay.
+    r"""Escape characters that a terminal would obey or hide, as ``\x1b`` and ``\u202e``; newlines and tabs stay.
 
-    Controls, bidirectional overrides and other format characters, lone surrogates (the undecodable bytes of a file's name)
-    and line separators are escaped as Python does. Text longer than ``max_characters`` is cut in the middle.
+    Controls, bidirectional overrides and other format characters, lone surrogates (undecodable bytes of a file name) and line
+    separators are escaped as Python does. Text longer than ``max_characters`` is cut in the middle.
     """
     if max_characters is not None and len(text) > max_characters:
         half = max(1, (max_characters - 3) // 2)
@@ -24,12 +24,12 @@ def printable(text: str, *, max_characters: int | None = None) -> str:
 
 
 def printable_line(text: str, *, max_characters: int | None = None) -> str:
-    """Return ``printable`` text with ends of lines and tabs escaped too: what a name or a server says takes one line."""
+    """Return ``printable`` text with newlines and tabs escaped too, for untrusted names and messages on one line."""
     return printable(text, max_characters=max_characters).replace("\n", "\\n").replace("\t", "\\t")
 
 
 def printable_json(text: str) -> str:
-    r"""Return a JSON text with the same characters written as JSON's own escapes: it stands for the same value."""
+    r"""Escape the same characters in a JSON text by JSON's own escapes, without changing its value."""
     if text.isascii() and "\x7f" not in text:
         return text
     return "".join(c if c in _KEPT or unicodedata.category(c) not in _INVISIBLE else _json_escaped(c) for c in text)

@@ -1,4 +1,4 @@
-"""Tell a file's format by its content, not by its name."""
+"""Detection of file formats by content rather than by name."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz", "3mf", "step"
 _HEAD_BYTES = 65536
 MSH_HEADER_BYTES = 16
 OFF_KEYWORD = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF(?=[\d\s])")
-"""How OFF begins; its vertices have texture coordinates, colours, normals, a fourth coordinate, any number of coordinates."""
+"""Start of OFF; its vertices may have texture coordinates, colours, normals, a fourth coordinate, any number of coordinates."""
 _PNM = re.compile(rb"P[1-6]\s+[0-9#]|P[1-6]#")
-"""Netpbm's bitmaps, greymaps and pixmaps, as text and binary (ppm(5)); behind the magic stands the width, or a comment."""
+"""Netpbm's bitmaps, greymaps and pixmaps, as text and binary (ppm(5)); the magic is followed by the width or a comment."""
 _STEP_BEGINS = "ISO-10303-21"
 FBX_BINARY, FBX_TEXT = b"Kaydara FBX Binary  ", re.compile(r"; *FBX (\d{1,2})\.(\d)\.\d+ project file")
-"""How an FBX file begins, as bytes and as text with its version."""
+"""Start of an FBX file, in binary form, and in text form with its version."""
 _NAME_CHARACTERS = 200
 _OBJ_KEYWORDS = frozenset(
     {"v", "vt", "vn", "vp", "f", "l", "p", "o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "cstype", "deg"}
@@ -35,7 +35,7 @@ _LONGEST_NUMBER = 64
 HEIC_NOT_READ = "HEIC is not read; convert it to PNG or JPEG"
 """Its only free decoder comes in wheels that bundle an encoder under the GPL."""
 ASSET_DESCRIPTION = "an asset description; manitwin import reads it with its meshes"
-"""URDF, SDF and USD, which name meshes."""
+"""For URDF, SDF and USD, which name meshes."""
 _CAMERA_RAW = "camera raw is not read; develop it to PNG or JPEG"
 _EXPORT = "this mesh format is not read; export it as glTF 2.0 or OBJ"
 _VIDEO = "a video; give a photo"
@@ -52,7 +52,7 @@ _NO_FILE_ITSELF = (
         f"holds an SVG drawing: {_IMAGE}",
     ),
 )
-"""What is often found under the name of an image or a mesh, by how it begins, and what to do about it."""
+"""Content often found under the name of an image or mesh, by its start, with a remedy."""
 NOT_READ = {
     **dict.fromkeys((".heic", ".heif"), HEIC_NOT_READ),
     **dict.fromkeys((".urdf", ".sdf", ".xacro", ".usd", ".usda", ".usdc"), ASSET_DESCRIPTION),
@@ -76,10 +76,10 @@ class Sniffed:
 
 
 def sniff(path: Path) -> Sniffed:
-    """Tell what a file is from its bytes; its name is not believed, and only says what a file is that is neither.
+    """Detect the format of a file from its bytes; its name only serves to describe a file that is neither image nor mesh.
 
-    Raises InputError: ``unreadable`` (no such file, or no permission), ``empty`` (zero bytes), ``wrong_type`` (neither
-    an image nor a mesh).
+    Raises InputError: ``unreadable`` (no such file, or no permission), ``empty`` (zero bytes), ``wrong_type`` (neither an image
+    nor a mesh).
     """
     called = printable_line(path.name, max_characters=_NAME_CHARACTERS)
     with open_regular(path, partial(InputError, "unreadable")) as stream:
@@ -106,12 +106,12 @@ def sniff(path: Path) -> Sniffed:
 
 
 def told_of_no_file_itself(head: bytes) -> str | None:
-    """Return what a file's first bytes are that stand in for it (a pointer of Git LFS, a web page), and what to do; else None."""
+    """Return what a placeholder (a Git LFS pointer, a web page) with these first bytes is, and a remedy; else None."""
     return next((told for begin, told in _NO_FILE_ITSELF if begin.match(head)), None)
 
 
 def image_format(head: bytes) -> str | None:
-    """Return the image format that a file's first 64 bytes show, one of IMAGE_FORMATS or ``heif``, or None."""
+    """Return the image format of a file by its first 64 bytes, one of IMAGE_FORMATS or ``heif``, or None."""
     if head.startswith(b"\x89PNG\r\n\x1a\n"):
         return "png"
     if head.startswith(b"\xff\xd8\xff"):
@@ -128,7 +128,7 @@ def image_format(head: bytes) -> str | None:
     if head[:2] == b"BM" and head[6:10] == b"\0\0\0\0":
         return "bmp"
     if head[4:8] == b"ftyp":
-        # ISO/IEC 23008-12: mif1 is any image of the family, and the compatible brands say which
+        # ISO/IEC 23008-12: mif1 is any image of the family, and the compatible brands specify it
         brands = {head[8:12], *(head[at : at + 4] for at in range(16, min(int.from_bytes(head[:4], "big"), 64), 4))}
         if brands & {b"avif", b"avis"}:
             return "avif"
@@ -148,14 +148,14 @@ def _mesh_format(head: bytes, size: int, suffix: str, stream: BinaryIO) -> str |
         return "3mf"
     if head.startswith(FBX_BINARY):
         return "fbx"
-    # a binary STL has no magic: 80 free bytes, a count, 50 bytes a triangle; its free bytes may even begin with "solid"
+    # a binary STL has no magic: 80 arbitrary bytes, which may even begin with "solid", a count, 50 bytes for each triangle
     if size >= 84 and size == 84 + 50 * int.from_bytes(head[80:84], "little"):
         return "stl"
-    if msh_bytes(head) == size:  # as little magic: counts that make up the file's size
+    if msh_bytes(head) == size:  # nor has this format: its counts determine the size of the file
         return "msh"
     text = _text(head)
     if text is None:
-        # a binary STL that was cut short still has the zero padding or "STL" in its 80 free bytes
+        # a truncated binary STL still has zero padding or "STL" in its 80 arbitrary bytes
         return "stl" if size >= 84 and suffix == ".stl" else None
     start = text.lstrip("\ufeff \t\r\n")
     if re.match(r"solid\b", start, re.IGNORECASE) and re.search(r"\bfacet\b|\bendsolid\b", start, re.IGNORECASE):
@@ -174,10 +174,10 @@ def _mesh_format(head: bytes, size: int, suffix: str, stream: BinaryIO) -> str |
 
 
 def msh_bytes(head: bytes) -> int | None:
-    """Return how many bytes a file of MuJoCo's binary meshes with this head has to have, None where it is the head of none.
+    """Return the size of a file of MuJoCo's binary mesh format with this head, None if the head is invalid.
 
-    It begins with four 32-bit integers: positions, normals and texture coordinates, each of the latter two one a position or
-    none, and triangles, of which there may be none. Source: the XML reference of MuJoCo, ``mesh``, "MSH file format".
+    The head is four 32-bit integers: the numbers of positions, normals, texture coordinates and triangles. The second and third
+    equal the first or are zero, and the last may be zero. Source: MuJoCo's XML reference, ``mesh``, "MSH file format".
     """
     if len(head) < MSH_HEADER_BYTES:
         return None
@@ -188,21 +188,21 @@ def msh_bytes(head: bytes) -> int | None:
 
 
 def _is_usdz(head: bytes) -> bool:
-    # a package's first member is its default layer (USDZ specification), and its name stands in the local header (APPNOTE 4.3.7)
+    # a package's first member is its default layer (USDZ specification); its name is in the local header (APPNOTE 4.3.7)
     length = int.from_bytes(head[26:28], "little")
     name = head[30 : 30 + length].decode("latin-1").lower()
     return name.endswith((".usd", ".usda", ".usdc"))
 
 
 def _holds_model(size: int, stream: BinaryIO) -> bool:
-    # an archive ends in the directory of its members (APPNOTE 4.3.6); Open Packaging Conventions ask for the first of these
+    # an archive ends in its central directory (APPNOTE 4.3.6); Open Packaging Conventions require the first of these names
     stream.seek(max(0, size - _HEAD_BYTES))
     tail = stream.read(_HEAD_BYTES)
     return b"[Content_Types].xml" in tail and b".model" in tail
 
 
 def _is_gltf(start: str, size: int, stream: BinaryIO) -> bool:
-    # "asset" may come last in a long file; the whole is only parsed where the head does not settle it
+    # "asset" may come last in a long file; the whole file is parsed only if the head is not conclusive
     if _names_gltf(start):
         return True
     if size > MAX_JSON_BYTES:
@@ -212,7 +212,7 @@ def _is_gltf(start: str, size: int, stream: BinaryIO) -> bool:
     try:
         tree = parse_json(stream.read(MAX_JSON_BYTES), "", ValueError)
     except ValueError:
-        # cut short: still named by what only glTF has
+        # truncated: only glTF has this key
         return re.search(r'"bufferViews?"\s*:', start) is not None
     return isinstance(tree, dict) and isinstance(tree.get("asset"), dict) and "version" in tree["asset"]
 
@@ -248,7 +248,7 @@ def _text(head: bytes) -> str | None:
         try:
             return head.decode(encoding)
         except UnicodeDecodeError as error:
-            # a character cut at the end of the head is no reason to say binary
+            # a character cut at the end of the head does not make the file binary
             if error.start >= len(head) - 4 and len(head) == _HEAD_BYTES:
                 return head[: error.start].decode(encoding)
     printable = sum(byte >= 32 or byte in (9, 10, 13) for byte in head)

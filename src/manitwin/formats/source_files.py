@@ -1,6 +1,6 @@
-"""The files that make up an input: a mesh file and the materials, buffers and textures that it names.
+"""Files that make up an input: a mesh file and the materials, buffers and textures that it names.
 
-What is read here is read by str methods and in one pass: no pattern that could backtrack meets the bytes of others.
+Files are scanned by str methods in one pass, without patterns that could backtrack on untrusted bytes.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ IMAGE_SUFFIXES = frozenset(
 )
 MAX_TEXT_BYTES = 512 * 1024 * 1024
 _MAP_KEYWORDS = frozenset({"bump", "norm", "disp", "decal", "refl"})
-# options of texture maps and how many words each takes (MTL specification, "Options for texture map statements")
+# options of texture maps with their numbers of words (MTL specification, "Options for texture map statements")
 _MAP_OPTIONS = {
     "-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2,
     "-o": 3, "-s": 3, "-t": 3, "-texres": 1, "-type": 1,
@@ -35,22 +35,22 @@ _MAP_OPTIONS = {
 _MAX_HEADER_BYTES = 1 << 20
 _MAX_LINE_BYTES = 1 << 13
 _BLOCK_BYTES = 1 << 20
-_MAX_NAMES = 10_000  # a mesh has fewer textures; each is looked up on the disk
+_MAX_NAMES = 10_000  # a mesh has fewer textures; each is looked up on disk
 _LONGEST_NAME, _LONGEST_PATH = 255, 4096  # bytes: NAME_MAX and PATH_MAX of Linux
 _PLY_TEXTURE = "comment TextureFile "
 
 
 def side_files(path: Path) -> list[Path]:
-    """Return the existing files that a mesh file names, sorted; only those inside its own folder, links resolved.
+    """Return the existing files that a mesh file names, sorted; only those inside its own folder, with links resolved.
 
-    Nothing is said of files that are missing or outside: that is for the reader to report.
+    Missing files and files outside the folder are ignored; the mesh reader reports them.
     """
     found = {named_file(path.parent, name) for name in named_files(path)}
     return sorted({file for file in found if file is not None} - {path.resolve()})
 
 
 def named_file(folder: Path, name: str) -> Path | None:
-    """Return the file that a mesh in a folder means by a name, links resolved; None where it is missing or outside."""
+    """Return the file that a name in a mesh denotes, with links resolved; None if it is missing or outside the folder."""
     for spelling in spellings(name):
         path = inside_folder(folder, spelling)
         if path is None or is_regular(path):
@@ -59,22 +59,22 @@ def named_file(folder: Path, name: str) -> Path | None:
 
 
 def is_regular(path: Path) -> bool:
-    """Tell whether a path leads to a regular file: no folder, pipe, socket or device."""
+    """Return whether a path leads to a regular file, rather than a folder, pipe, socket or device."""
     try:
         return stat.S_ISREG(os.stat(path).st_mode)
-    except (OSError, ValueError):  # not there, or a name that no file system can hold
+    except (OSError, ValueError):  # missing, or a name that no file system can hold
         return False
 
 
 def spellings(name: str) -> list[str]:
-    """Return the paths, relative to a mesh's folder, that a name in the mesh may mean, the likelier first."""
+    """Return the paths, relative to a mesh's folder, that a name in the mesh may denote, most likely first."""
     clean = name.strip().strip('"').replace("\\", "/")
     return [clean] if unquote(clean) == clean else [clean, unquote(clean)]
 
 
 def inside_folder(folder: Path, name: str, *, root: Path | None = None) -> Path | None:
-    """Return the path that a name means from a folder, links resolved; None where it leads out of it, or of ``root``."""
-    # a drive letter and a scheme both have a colon; neither is a file beside this one
+    """Return the path that a name denotes in a folder, with links resolved; None if it leaves the folder, or ``root``."""
+    # a drive letter and a scheme both have a colon; neither is a file in this folder
     if not name or "\0" in name or name.startswith(("/", "~")) or re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", name):
         return None
     if len(name) > _LONGEST_PATH or any(len(part) > _LONGEST_NAME for part in name.split("/")):
@@ -83,7 +83,7 @@ def inside_folder(folder: Path, name: str, *, root: Path | None = None) -> Path 
         here = folder.resolve()
         target = (here / name).resolve()
         root = here if root is None else root.resolve()
-    except (OSError, ValueError, RuntimeError):  # a name that no file system can hold; a loop of links
+    except (OSError, ValueError, RuntimeError):  # a name that no file system can hold, or a loop of links
         return None
     return target if target.is_relative_to(root) else None
 
@@ -91,8 +91,8 @@ def inside_folder(folder: Path, name: str, *, root: Path | None = None) -> Path 
 def named_files(path: Path) -> Iterator[str]:
     """Yield the names of other files in a mesh file (textures, materials, buffers), as the mesh writes them.
 
-    Of binary formats only the header is read, of OBJ no more than its material statements are decoded. A file that cannot be
-    read, or is no regular one, names none: that is for the reader to say.
+    For binary formats only the header is read, and in OBJ only material statements are decoded. A file that is unreadable or
+    not regular yields nothing; the mesh reader reports it.
     """
     names = {".obj": _named_by_obj, ".gltf": _named_by_gltf, ".glb": _named_by_glb, ".dae": _named_by_dae,
              ".ply": _named_by_ply, ".fbx": _named_by_fbx}.get(path.suffix.lower())  # fmt: skip
@@ -104,25 +104,25 @@ def named_files(path: Path) -> Iterator[str]:
 
 
 class _Unread(Exception):
-    """A file that names nothing, since it cannot be read."""
+    """An unreadable file, which yields no names."""
 
 
 def map_file_name(statement: str) -> str:
-    """Return the file name of an MTL map statement: options come first, and a name may hold spaces."""
+    """Return the file name of an MTL map statement: options come first, and the name may contain spaces."""
     words = statement.split()
     skip = 0
     while skip < len(words) and words[skip].lower() in _MAP_OPTIONS:
         option = words[skip].lower()
         skip += 1
         taken = 0
-        # -o, -s and -t may give fewer numbers than three
+        # -o, -s and -t may have fewer than three numbers
         while taken < _MAP_OPTIONS[option] and skip < len(words) - 1 and (taken == 0 or _is_number(words[skip])):
             skip, taken = skip + 1, taken + 1
     return statement if skip == 0 else " ".join(words[skip:])
 
 
 def ply_texture(header: bytes) -> str | None:
-    """Return the texture that a PLY header names in MeshLab's way: ``comment TextureFile NAME``; the last one counts."""
+    """Return the texture that a PLY header names in MeshLab's form ``comment TextureFile NAME``; the last one counts."""
     lines = header.decode("utf-8", errors="replace").splitlines()
     names = [line.removeprefix(_PLY_TEXTURE).strip() for line in lines if line.startswith(_PLY_TEXTURE)]
     return names[-1] if names else None
@@ -155,13 +155,13 @@ def _named_by_obj(path: Path) -> Iterator[str]:
 
 
 def _material_libraries(stream: BinaryIO) -> Iterator[str]:
-    """Yield what stands behind ``mtllib`` where that begins a line, block by block; lines longer than 8 KiB name nothing."""
+    """Yield what follows ``mtllib`` at the start of a line, block by block; lines longer than 8 KiB are ignored."""
     rest = b""
     while block := stream.read(_BLOCK_BYTES):
         lines, _, rest = (rest + block).rpartition(b"\n")
         if b"mtllib" in lines:
             yield from _libraries_in(lines)
-        # of a long line it is enough to know that it does not begin here
+        # for a long line it suffices to know that the statement does not begin here
         rest = rest if len(rest) <= _MAX_LINE_BYTES else b"." * _MAX_LINE_BYTES
     yield from _libraries_in(rest)
 
@@ -169,7 +169,7 @@ def _material_libraries(stream: BinaryIO) -> Iterator[str]:
 def _libraries_in(text: bytes) -> Iterator[str]:
     at = text.find(b"mtllib")
     while at >= 0:
-        # the statement is a line of its own; names with "mtllib" in them are none
+        # the statement starts a line; names that contain "mtllib" are skipped
         start = text.rfind(b"\n", 0, at) + 1
         end = text.find(b"\n", at)
         end = len(text) if end < 0 else end
@@ -193,7 +193,7 @@ def _named_by_gltf(path: Path) -> Iterator[str]:
 
 def _named_by_glb(path: Path) -> Iterator[str]:
     with open_regular(path, _Unread) as stream:
-        header = stream.read(20)  # magic, version, length; then the length and kind of the JSON chunk
+        header = stream.read(20)  # magic, version, length; then length and type of the JSON chunk
         size = int.from_bytes(header[12:16], "little")
         if header[:4] == b"glTF" and header[16:20] == b"JSON" and size <= MAX_TEXT_BYTES:
             yield from _named_by_gltf_json(stream.read(size))
@@ -229,7 +229,7 @@ def _named_by_dae(path: Path) -> Iterator[str]:
 
 
 def _text_at(data: bytes, start: int) -> tuple[str, int]:
-    """Return the text of an element that begins at ``start``, stripped, and where it ends; a longer one than a path is none."""
+    """Return the stripped text of an element that begins at ``start``, and its end; empty if longer than any path."""
     end = data.find(b"<", start)
     end = len(data) if end < 0 else end
     text = data[start:end].strip() if end - start <= _MAX_LINE_BYTES else b""

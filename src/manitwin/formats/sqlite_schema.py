@@ -1,4 +1,4 @@
-"""Is the schema of an SQLite file ours? A file of others may have views and triggers that run without an end."""
+"""Check of an SQLite schema: an untrusted file may have views and triggers that never end."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ _OBJECTS = "SELECT type, name, tbl_name, sql FROM sqlite_schema WHERE name NOT L
 
 
 def has_schema(connection: sqlite3.Connection, make: Callable[[sqlite3.Connection], object]) -> bool:
-    """Tell whether a database has the tables, indices and triggers that ``make`` gives an empty one, word for word, and no more.
+    """Return whether a database has exactly the tables, indices and triggers that ``make`` creates in an empty one.
 
-    A view in a table's place is run by the first SELECT: one with a recursive query that does not end would hang its reader.
+    The first SELECT executes a view in place of a table: an endless recursive query in it would hang the reader.
     """
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as ours:
         make(ours)

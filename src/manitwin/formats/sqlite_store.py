@@ -1,4 +1,4 @@
-"""What stores that keep one SQLite file do alike: transactions, and errors that name the file."""
+"""Common parts of stores in a single SQLite file: transactions, and errors that name the file."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from manitwin.formats.sqlite_schema import has_schema
 BUSY_S = 30.0
 """How long a store waits for another process that writes to it."""
 MOST_SAID = 120
-"""Characters of what SQLite says that a message repeats."""
+"""Length limit of SQLite's message within an error message."""
 
 
 @contextmanager
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """Commit what the block does when it has ended well, and nothing of it otherwise.
+    """Commit the block's changes if it ends normally, and roll them back otherwise.
 
     The connection is in autocommit mode (``isolation_level=None``).
     """
@@ -35,7 +35,7 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
 
 @contextmanager
 def errors_named(path: Path, refusal: str) -> Iterator[None]:
-    """Raise SQLite's errors in the block as UsageError that names the file; ``refusal`` is as for ``damaged``."""
+    """Convert SQLite's errors in the block to UsageError naming the file; ``refusal`` is as for ``damaged``."""
     try:
         yield
     except sqlite3.OperationalError as error:
@@ -46,14 +46,14 @@ def errors_named(path: Path, refusal: str) -> Iterator[None]:
 
 
 def damaged(path: Path, cause: object, refusal: str) -> UsageError:
-    """Return the error of a file that cannot be read; ``refusal`` is its message, in which {cause} stands for the cause."""
+    """Return the error of an unreadable file; ``refusal`` is its message, with {cause} in place of the cause."""
     return UsageError(f"{path}: {refusal.format(cause=printable_line(str(cause), max_characters=MOST_SAID))}")
 
 
 def flaw_in(
     connection: sqlite3.Connection, make: Callable[[sqlite3.Connection], object], *, tables_of: str
 ) -> str | None:
-    """Return what is wrong with a database that should be as ``make`` gives an empty one; None where nothing is."""
+    """Return what is wrong with a database that should have the schema that ``make`` creates; None if nothing is."""
     if not has_schema(connection, make):
         return f"its tables do not match those of {tables_of}"
     (said,) = connection.execute("PRAGMA quick_check(1)").fetchone()

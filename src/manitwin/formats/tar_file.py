@@ -1,4 +1,4 @@
-"""Tarballs that others packed: named members alone, each within a limit, and no more unpacked on the way than another."""
+"""Reader of untrusted tarballs: selected members, each within a limit, and a limit on the total unpacked size."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class _TooMuch(Exception):
 
 
 class _Unpacked:
-    """A gzipped stream that refuses to give more than ``limit`` bytes: names and comments of a tarball count too."""
+    """A gzipped stream limited to ``limit`` bytes, including the names and comments of a tarball."""
 
     def __init__(self, stream: gzip.GzipFile, limit: int) -> None:
         self._stream, self._left = stream, limit
@@ -36,10 +36,10 @@ class _Unpacked:
 def read_members(
     path: Path, wanted: Callable[[str], int], refuse: Refusal, *, max_unpacked_bytes: int
 ) -> dict[str, bytes]:
-    """Return the regular members of a gzipped tarball that ``wanted`` gives a limit in bytes above 0, by name.
+    """Return, by name, the regular members of a gzipped tarball for which ``wanted`` returns a positive size limit.
 
-    Nothing is written; links, devices and folders are passed over. Raises what ``refuse`` makes of one line: no such tarball, a
-    member that is larger than its limit or comes twice, more members than ``MAX_MEMBERS`` or bytes than ``max_unpacked_bytes``.
+    Nothing is written; links, devices and folders are skipped. Raises the error that ``refuse`` makes of a line: no such
+    tarball, a member that exceeds its limit or occurs twice, more than ``MAX_MEMBERS`` members or ``max_unpacked_bytes`` bytes.
     """
     called = printable_line(path.name, max_characters=200)
     found: dict[str, bytes] = {}

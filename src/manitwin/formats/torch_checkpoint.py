@@ -1,7 +1,7 @@
-"""PyTorch's checkpoints before its version 1.6, read without PyTorch: a pickle of which only tensors are made, and raw storages.
+"""Reader of PyTorch checkpoints from before version 1.6, without PyTorch: a pickle restricted to tensors, and raw storages.
 
-Layout (torch/serialization.py, ``_legacy_save``): pickles of a magic number, of the protocol's version, of the writer's
-sizes, of the object, and of the keys of the storages; then each storage as a 64-bit count and its elements.
+Layout (torch/serialization.py, ``_legacy_save``): pickles of a magic number, the protocol version, the writer's sizes, the
+object, and the keys of the storages; then each storage as a 64-bit count and its elements.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class _Tensor:
 
 
 class _OnlyTensors(pickle.Unpickler):
-    """Makes numbers, words, ordered dictionaries and descriptions of tensors; nothing that a pickle names is called."""
+    """Unpickler that creates only numbers, strings, ordered dictionaries and descriptions of tensors, and calls nothing else."""
 
     def find_class(self, module: str, name: str) -> Any:
         if module == "torch" and name in _DTYPES:
@@ -77,10 +77,10 @@ def _described(storage: Any, offset: Any, shape: Any, strides: Any, *_: Any) -> 
 
 
 def parse_torch_checkpoint(content: bytes, name: str, refuse: Refusal) -> dict[str, np.ndarray]:
-    """Return the tensors of a state dictionary by name, each a contiguous array of its own shape and type.
+    """Return the tensors of a state dictionary by name, each a contiguous array with its own shape and type.
 
-    Raises what ``refuse`` makes of one line that begins with ``name``: for another format, for a pickle that names anything
-    but storages, tensors and ordered dictionaries, and for a tensor that reaches beyond its storage.
+    Raises the error that ``refuse`` makes of a line starting with ``name``: for another format, a pickle that names anything
+    but storages, tensors and ordered dictionaries, and a tensor that exceeds its storage.
     """
     called = printable_line(name)
     stream = io.BytesIO(content)
@@ -118,7 +118,7 @@ def _exactly(read: Callable[[int], bytes], count: int) -> bytes:
 
 
 def _strided(storage: np.ndarray, tensor: _Tensor) -> np.ndarray:
-    """Return a tensor's elements; those of weights that were transposed do not lie in the order of the axes."""
+    """Return the elements of a tensor in axis order; transposed weights are stored in another order."""
     if 0 in tensor.shape:
         return np.zeros(tensor.shape, storage.dtype)
     last = tensor.offset + sum((side - 1) * stride for side, stride in zip(tensor.shape, tensor.strides, strict=True))

@@ -1,4 +1,4 @@
-"""Where a user's own files lie that programs may make again (XDG Base Directory Specification)."""
+"""Folders for a user's files that can be created again (XDG Base Directory Specification)."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 
 def cache_home() -> Path:
-    """Return ``$XDG_CACHE_HOME/manitwin``, ``~/.cache/manitwin`` by default; a relative path counts as none, as specified.
+    """Return ``$XDG_CACHE_HOME/manitwin``, or ``~/.cache/manitwin`` if the variable is not an absolute path, as specified.
 
-    Raises RuntimeError where the user has no home either.
+    Raises RuntimeError if the user has no home folder either.
     """
     base = os.environ.get("XDG_CACHE_HOME", "")
     return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "manitwin"

@@ -1,7 +1,6 @@
-"""XML in and out: what others wrote is read without document type, entities, includes or network; what is written is the same
-bytes for the same content.
+"""XML parsing and writing: untrusted XML is read without document types, entities, includes or network access.
 
-All XML of the package is parsed here, but for what is too large for a tree (``xml_walk``).
+Written XML is deterministic. All XML of the package is parsed here, except for documents too large for a tree (``xml_walk``).
 """
 
 from __future__ import annotations
@@ -25,9 +24,9 @@ _BARE_AMPERSAND = ("ERR_NAME_REQUIRED", "ERR_ENTITYREF_SEMICOL_MISSING")
 _UNKNOWN_PREFIX = "NS_ERR_UNDEFINED_NAMESPACE"
 _LESS_IN_VALUE = "ERR_LT_IN_ATTRIBUTE"
 _AFTER_THE_ROOT = "ERR_DOCUMENT_END"
-"""TinyXML takes the first root, and nobody looks at what comes after it."""
+"""TinyXML uses the first root and ignores what follows it."""
 _HEAD_BYTES, _DECLARATION_BYTES = 1 << 16, 1 << 10
-MAX_NUMBER = 1e9  # no length, mass or moment of an object that a gripper meets comes near
+MAX_NUMBER = 1e9  # larger than any length, mass or moment of an object for a gripper
 
 
 def read_xml(
@@ -39,9 +38,9 @@ def read_xml(
     comments: bool = True,
     inside: Path | None = None,
 ) -> etree._Element:
-    """Return the root element of a file, which must be ``tag``; raises ``refusal`` of what is wrong with it.
+    """Return the root element of a file, which must be ``tag``; raises ``refusal`` for defects.
 
-    ``name`` is what messages call the file: its own name by default. ``inside``: a link may not lead out of this folder.
+    ``name`` is what messages call the file (default: its own name). ``inside``: a folder that a link may not leave.
     """
     name = name or path.name
     data = read_bytes(path, MAX_XML_BYTES, refusal, inside=inside, name=name)
@@ -59,9 +58,9 @@ def parse_xml(
 ) -> etree._Element:
     """Return the root element of a document, which must be ``tag`` in any namespace.
 
-    Raises ``refusal`` of a message that begins with ``name``: broken XML, another root, a document type, or more than
-    ``max_bytes`` (None: the caller has limited them, and texts may be long too). Entities and XIncludes stay as they are
-    written, nothing else is opened.
+    Raises ``refusal`` with a message starting with ``name``: broken XML, another root, a document type, or more than
+    ``max_bytes`` (None: the caller has limited the size, and long texts are allowed). Entities and XIncludes stay unexpanded,
+    and nothing else is opened.
     """
     data = data.encode() if isinstance(data, str) else data
     if max_bytes is not None and len(data) > max_bytes:
@@ -70,7 +69,8 @@ def parse_xml(
     declares_type = _declares_document_type(data)
     if declares_type:
         raise refusal(f"{name}: its XML declares a document type, which is not read; remove it")
-    huge_tree = max_bytes is None and declares_type is False  # it also lifts libxml2's limit on expanding entities
+    # huge_tree also lifts libxml2's limit on expanding entities
+    huge_tree = max_bytes is None and declares_type is False
     parser = _parser(comments, huge_tree)
     try:
         root = etree.fromstring(data, parser)
@@ -106,7 +106,7 @@ def _parser(comments: bool, huge_tree: bool, recover: bool = False) -> etree.XML
 
 
 def _with_sound_comments(data: bytes) -> bytes:
-    """Return a document without two hyphens within comments, which TinyXML and so Gazebo, PyBullet and MuJoCo do not mind."""
+    """Separate double hyphens within comments, which TinyXML, and with it Gazebo, PyBullet and MuJoCo, accept."""
 
     def apart(comment: re.Match[bytes]) -> bytes:
         inside = re.sub(rb"-(?=-)", b"- ", comment.group(1))
@@ -116,22 +116,22 @@ def _with_sound_comments(data: bytes) -> bytes:
 
 
 def _with_sound_values(data: bytes) -> bytes:
-    """Return a document whose attributes have ``<`` written out, which TinyXML and so Gazebo does not mind."""
+    """Escape ``<`` in attribute values, which TinyXML and with it Gazebo accept."""
     return re.sub(rb'="[^"\n]*"', lambda value: value.group().replace(b"<", b"&lt;"), data)
 
 
 def _without_declarations(data: bytes) -> bytes:
-    """Return a document without what begins with ``<!`` and is nothing that XML has: TinyXML skips it."""
+    """Remove invalid markup that begins with ``<!``, which TinyXML skips."""
     return re.sub(rb"<!(?!--|\[CDATA\[|DOCTYPE)[^<>]*>", b"", data)
 
 
 def _with_sound_ampersands(data: bytes) -> bytes:
-    """Return a document whose ampersands that begin no reference are written out, which TinyXML and so Gazebo does not mind."""
+    """Escape ampersands that begin no reference, which TinyXML and with it Gazebo accept."""
     return re.sub(rb"&(?!#?\w+;)", b"&amp;", data)
 
 
 def _without_unknown_prefixes(root: etree._Element) -> etree._Element:
-    """Take out elements and attributes whose prefix is nowhere declared: what tools add for themselves alone, as others skip."""
+    """Remove elements and attributes with an undeclared prefix: private additions of tools, which other loaders skip."""
     for element in list(root.iter(etree.Element)):
         if ":" in element.tag.rpartition("}")[2] and element is not root:
             element.getparent().remove(element)
@@ -141,9 +141,9 @@ def _without_unknown_prefixes(root: etree._Element) -> etree._Element:
 
 
 def _declared_first(data: bytes) -> bytes:
-    """Return a document whose XML declaration stands first and says version 1.0.
+    """Move the XML declaration to the start of a document and set it to version 1.0.
 
-    Blank lines and comments above it, and versions such as 0.0, are common in robot descriptions, and read by PyBullet,
+    Blank lines and comments above it, and versions such as 0.0, are common in robot descriptions and accepted by PyBullet,
     MuJoCo and Gazebo.
     """
     start = data.find(b"<?xml", 0, _HEAD_BYTES)
@@ -165,11 +165,11 @@ def _declared_first(data: bytes) -> bytes:
 
 
 class _Found(Exception):
-    """Ends expat's parsing."""
+    """Ends the parsing by expat."""
 
 
 def _declares_document_type(data: bytes) -> bool | None:
-    """Look for a document type above the root element, before any entity in it could be put in; None: not to be told."""
+    """Return whether there is a document type above the root element, before entities are expanded; None if undetermined."""
     parser = expat.ParserCreate()
     found: list[bool] = []
 
@@ -183,13 +183,13 @@ def _declares_document_type(data: bytes) -> bool | None:
         parser.Parse(data, True)
     except _Found:
         return found[0]
-    except (expat.ExpatError, ValueError, LookupError):  # broken, or an encoding that it does not know: lxml says so
+    except (expat.ExpatError, ValueError, LookupError):  # broken, or an encoding unknown to expat: lxml reports it
         return None
     return None
 
 
 def number(text: str | None, what: str) -> float:
-    """Return a number that must be there and finite; raises AssetError saying ``what`` it is of."""
+    """Return a finite number; raises AssetError naming ``what`` it is if missing or invalid."""
     try:
         value = float(text or "")
     except ValueError as error:
@@ -200,7 +200,7 @@ def number(text: str | None, what: str) -> float:
 
 
 def numbers(text: str | None, count: int, what: str) -> np.ndarray:
-    """Return exactly ``count`` numbers ``(count,)``; raises AssetError saying ``what`` they are of."""
+    """Return exactly ``count`` numbers ``(count,)``; raises AssetError naming ``what`` they are."""
     words = (text or "").split()
     if len(words) != count:
         raise AssetError(f"{what}: {(text or '')[:40]!r} are not {count} numbers")
@@ -208,13 +208,13 @@ def numbers(text: str | None, count: int, what: str) -> np.ndarray:
 
 
 def text_of(element: etree._Element, path: str) -> str | None:
-    """Return the text of a descendant in one line without quotes around it, or None where it is empty."""
+    """Return the text of a descendant as one line without enclosing quotes, or None if it is empty."""
     text = " ".join((element.findtext(path) or "").split()).strip("\"'")
     return text or None
 
 
 def comments_before(root: etree._Element) -> tuple[str, ...]:
-    """Return the comments above and directly below the root element, in order, their lines without white space around."""
+    """Return the comments above and directly below the root element, in order, with normalized white space in each line."""
     above = [n.text for n in reversed(list(root.itersiblings(preceding=True))) if n.tag is etree.Comment]
     below = [n.text for n in root.iterchildren(etree.Comment)]
     return tuple(
@@ -223,27 +223,27 @@ def comments_before(root: etree._Element) -> tuple[str, ...]:
 
 
 def new_element(tag: str, **attributes: str) -> etree._Element:
-    """Return an element without parent; attributes keep the order in which they are given."""
+    """Return an element without parent; attributes keep their order."""
     return etree.Element(tag, attributes)
 
 
 def add(parent: etree._Element, tag: str, text: str | None = None, **attributes: str) -> etree._Element:
-    """Append an element and return it; attributes keep the order in which they are given."""
+    """Append an element and return it; attributes keep their order."""
     element = etree.SubElement(parent, tag, attributes)
     element.text = text
     return element
 
 
 def number_text(*values: float) -> str:
-    """Return numbers as the shortest text that reads back as the same ones. Raises ExportError for one that is not finite."""
+    """Format numbers as the shortest text that restores them exactly. Raises ExportError for one that is not finite."""
     for value in values:
         if not math.isfinite(value):
             raise ExportError(f"{value} is no number that a simulator can use; build the twin again")
-    return " ".join(repr(float(value) + 0.0) for value in values)  # + 0.0: no negative zero
+    return " ".join(repr(float(value) + 0.0) for value in values)  # + 0.0 avoids negative zeros
 
 
 def document(root: etree._Element, comments: Iterable[str]) -> bytes:
-    """Return the indented document with ``comments`` above everything else in its root element."""
+    """Return the indented document with ``comments`` at the top of its root element."""
     for position, text in enumerate(comments):
         root.insert(position, etree.Comment(f" {_without_double_hyphen(one_line(text))} "))
     etree.indent(root)
@@ -252,7 +252,7 @@ def document(root: etree._Element, comments: Iterable[str]) -> bytes:
 
 
 def edited_document(root: etree._Element) -> bytes:
-    """Return a document that was parsed and edited, with all around its root element as it was."""
+    """Return a document that was parsed and edited, including the content around its root element."""
     data: bytes = etree.tostring(root.getroottree(), xml_declaration=True, encoding="utf-8")
     return data
 
@@ -264,7 +264,7 @@ def xml_text(element: etree._Element) -> str:
 
 
 def _without_double_hyphen(text: str) -> str:
-    """Return text for a comment, which ends at two hyphens (XML 1.0, section 2.5) and may not end with one."""
+    """Return text for a comment, which may neither contain a double hyphen nor end with a hyphen (XML 1.0, section 2.5)."""
     while "--" in text:
         text = text.replace("--", "- -")
     return text.rstrip("-")

@@ -1,4 +1,4 @@
-"""XML documents that are too large for a tree in memory: each element is told as it comes."""
+"""Event-based parsing of XML documents that are too large for a tree in memory."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from manitwin.formats.bounded_file import Refusal
 
 
 class XmlWalker(Protocol):
-    """What is told of each element of a document, in its order."""
+    """Handler for the elements of a document, in order."""
 
     def start(self, tag: str, attributes: Mapping[str, str], namespaces: Mapping[str | None, str]) -> None:
-        """Take an element's name and its attributes, both without namespaces, and the prefixes that it declares."""
+        """Handle the start of an element: name and attributes, both without namespaces, and the prefixes that it declares."""
 
     def end(self, tag: str) -> None:
-        """Take the end of an element."""
+        """Handle the end of an element."""
 
 
 def walk_xml(blocks: Iterable[bytes], walker: XmlWalker, name: str, *, refusal: Refusal) -> None:
-    """Tell a ``walker`` of each element of a document that comes in ``blocks``.
+    """Pass each element of a document that comes in ``blocks`` to a ``walker``.
 
-    Raises ``refusal`` of a message that begins with ``name``: broken XML, or a document type. Nothing else is opened.
+    Raises ``refusal`` with a message starting with ``name``: broken XML, or a document type. Nothing else is opened.
     """
     parser = etree.XMLParser(
         target=_Told(walker, name, refusal), resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False
@@ -37,11 +37,11 @@ def walk_xml(blocks: Iterable[bytes], walker: XmlWalker, name: str, *, refusal: 
 
 
 class _Told:
-    """Hands on to a walker what lxml tells."""
+    """Adapter from lxml's parser target to a walker."""
 
     def __init__(self, walker: XmlWalker, name: str, refusal: Refusal):
         self._walker, self._name, self._refusal = walker, name, refusal
-        self._plain: dict[str, str] = {}  # names without namespace: there are millions of elements, and few names
+        self._plain: dict[str, str] = {}  # names without namespace: there are millions of elements, but few names
 
     def start(self, tag: str, attributes: Mapping[str, str], namespaces: Mapping[str | None, str]) -> None:
         if any(key[0] == "{" for key in attributes):
@@ -55,10 +55,10 @@ class _Told:
         raise self._refusal(f"{self._name}: its XML declares a document type, which is not read; remove it")
 
     def data(self, _: str) -> None:
-        """Texts are not told."""
+        """Texts are ignored."""
 
     def close(self) -> None:
-        """Nothing is kept."""
+        """There is no result to return."""
 
     def _without_namespace(self, name: str) -> str:
         plain = self._plain.get(name)

@@ -1,1 +1,1 @@
-"""Scenes of several twins: layouts, files, exports."""
+"""Scenes of several twins: layouts, scene files, exports, localization from camera data, perception data and VQA."""

@@ -1,4 +1,4 @@
-"""Furniture and lights of a scene's record, as the renderer takes them."""
+"""Furniture and lights of a scene's record as input of the renderer."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from manitwin.render.scene_renderer import SceneRenderer, Surroundings
 from manitwin.scenes.scene import Furniture, Light, SurfaceBox
 
 TEXTURE_VARIANTS = 8
-"""Of each material: making one takes a third of a CPU-second, so that they are kept and used again."""
+"""Number of textures for each material: making one takes a third of a CPU-second, so they are cached and reused."""
 
 
 LEGGED, LEG_HALF_M = "table", 0.03
 BOXES_KEPT = 8
-"""Ready to be drawn, some 10 MB each: most episodes stand on one of so many tables."""
+"""Number of cached boxes, some 10 MB each: most episodes use one of a few tables."""
 
 
 def add_furniture(renderer: SceneRenderer, furniture: Furniture, *, seed: int) -> None:
-    """Add the boxes of a piece of furniture under their names, in their order; ``seed`` chooses the textures.
+    """Add the boxes of a piece of furniture under their names, in order; ``seed`` selects the textures.
 
-    Boxes of one material share a texture, each with its own stretch of it; the box ``table`` gets legs. Raises UsageError for
-    an unknown material.
+    Boxes of one material share a texture at different offsets; the box ``table`` gets legs. Raises UsageError for an unknown
+    material.
     """
     for box in furniture.boxes:
         pose = transform(translation=np.array(box.center_m))
@@ -47,7 +47,7 @@ def _box_drawable(box: SurfaceBox, variant: int) -> Drawable:
 
 
 def _legs(table: SurfaceBox) -> list[TexturedBox]:
-    """Return four legs down to the room's floor, in the table's frame: they are of its looks only."""
+    """Return four legs down to the floor of the room, in the table's frame; they have no collision shape."""
     x, y, z = table.half_extents_m
     half_m = np.array([LEG_HALF_M, LEG_HALF_M, (table.center_m[2] - z - Surroundings().floor_z_m) / 2])
     if half_m[2] <= 0:
@@ -63,7 +63,7 @@ def _legs(table: SurfaceBox) -> list[TexturedBox]:
 
 
 def lighting_of(ambient: tuple[float, float, float], lights: Iterable[Light]) -> Lighting:
-    """Return the lights of a scene's record."""
+    """Return the lights of a scene's record as renderer lighting."""
     return Lighting(
         np.array(ambient),
         tuple(DirectionalLight(np.array(x.direction), np.array(x.color), x.casts_shadow) for x in lights),

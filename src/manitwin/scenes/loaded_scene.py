@@ -1,4 +1,4 @@
-"""A scene in memory: its record with the twins that stand in it."""
+"""Scene in memory: its record and its twins."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 
 class Scene:
-    """A layout: which twins stand where. World frame, metres, +Z up; a twin is read when it is asked for."""
+    """A layout of twins in the world frame, metres, +Z up; twins are read on demand."""
 
     def __init__(self, record: SceneRecord, twins: TwinSource):
-        """Take a record and the place that its twins are found in."""
+        """Create a scene from a record and the data set of its twins."""
         self.record = record
         self._source = twins
         self._twins: dict[str, Twin] = {}
@@ -32,14 +32,14 @@ class Scene:
 
     @classmethod
     def read(cls, scene: str | Path, dataset: str | Path) -> Scene:
-        """Read a scene's file or folder; ``dataset`` is what it was sampled from. Raises UsageError."""
+        """Read a scene's file or folder; ``dataset`` is the data set it was sampled from. Raises UsageError."""
         return cls(read_scene(Path(scene)), TwinSource(dataset))
 
     def __repr__(self) -> str:
         return f"Scene({self.record.scene_id}, {len(self.record.objects)} objects on a {self.record.furniture.kind})"
 
     def twin(self, twin_id: str) -> Twin:
-        """Return one of the scene's twins; raises UsageError where it is not in the data set."""
+        """Return one of the scene's twins; raises UsageError if it is not in the data set."""
         if twin_id not in self._twins:
             self._twins[twin_id] = self._source.twin(twin_id)
         return self._twins[twin_id]
@@ -52,31 +52,31 @@ class Scene:
 
     @property
     def stale(self) -> str | None:
-        """A line on twins that were made again and stand otherwise now than in the scene; None where there are none."""
+        """A line on twins that were rebuilt and rest differently now than in the scene; None if there are none."""
         return changed_twins([self.record], StatesNow(self._source)).line
 
     def placed_objects(self) -> list[PlacedObject]:
-        """Return the objects with their bodies, in the record's order; raises UsageError for a twin that is not there."""
+        """Return the objects with their bodies, in the record's order; raises UsageError for a missing twin."""
         return [
             PlacedObject(each.name, each.twin_id, self.body(each.twin_id), object_pose(each))
             for each in self.record.objects
         ]
 
     def static_boxes(self) -> list[StaticBox]:
-        """Return the furniture."""
+        """Return the boxes of the furniture."""
         return furniture_boxes(self.record.furniture)
 
     def add_to_sapien(self, scene: Any, *, visual: bool = True) -> SapienEntities:
-        """Add objects and furniture to a SAPIEN 3 scene, with ``visual`` their looks and lights too; returns them by name.
+        """Add objects and furniture to a SAPIEN 3 scene, with ``visual`` also render shapes and lights; return them by name.
 
-        With ``visual`` the scene needs a render system.
+        ``visual`` requires a render system.
         """
         from manitwin.scenes.sapien_scene import add_to_sapien
 
         return add_to_sapien(scene, self.record, self.static_boxes(), self.placed_objects(), self.twin, visual=visual)
 
     def to_mujoco(self) -> mujoco.MjModel:
-        """Return a MuJoCo model: the objects are free bodies of their names, ``qpos0`` is the recorded scene."""
+        """Return a MuJoCo model in which objects are free bodies with their names; ``qpos0`` is the recorded scene."""
         from manitwin.scenes.mujoco_scene import to_mujoco
 
         return to_mujoco(self.static_boxes(), self.placed_objects())

@@ -1,4 +1,4 @@
-"""A scene in MuJoCo: bodies with their own mass properties, furniture of boxes, contacts as soft as MuJoCo's default."""
+"""Scene in MuJoCo: bodies with their own mass properties, furniture of boxes, contacts with MuJoCo's default softness."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from manitwin.physics.mujoco.body import (
 
 
 def to_mujoco(boxes: Iterable[StaticBox], placed_objects: Iterable[PlacedObject]) -> mujoco.MjModel:
-    """Return the model of furniture and objects: each object a body with a free joint of its name, ``qpos0`` the poses given.
+    """Return a model of furniture and objects, each a body with a free joint of its name; ``qpos0`` has the given poses.
 
-    MuJoCo takes the larger friction of two that touch, where PhysX takes the mean.
+    MuJoCo uses the larger friction of two touching bodies, whereas PhysX uses the mean.
     """
     spec = new_spec(TIMESTEP_S)
     contact = contact_parameters(FURNITURE_FRICTION, SOFT_SOLREF)

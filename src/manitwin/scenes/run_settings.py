@@ -1,4 +1,4 @@
-"""Settings of a run that makes layouts or episodes: read, and compared with those that its folder was made with."""
+"""Settings of a run that makes layouts or episodes: loading, and comparison with those of earlier runs in its folder."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Application = TypeVar("Application", bound=Section)
 
 
 def load_settings(kind: type[Application], file: Path | None, given: dict[str, Any]) -> Application:
-    """Return an application's settings: a TOML file's, where one is named, below those ``given`` by hand.
+    """Return the settings of an application: those ``given`` by the caller, over those of a TOML file, if one is named.
 
-    A given value that is None was not given; one that is a dict adds to its section. Raises ConfigError naming the file, or
-    the command line, and the key.
+    A given None means not given; a given dict is merged into its section. Raises ConfigError naming the file, or the command
+    line, and the key.
     """
     said = {} if file is None else read_toml(file)
     validated(kind, said, str(file))
@@ -33,7 +33,7 @@ def load_settings(kind: type[Application], file: Path | None, given: dict[str, A
 
 
 def earlier_settings(root: DatasetRoot) -> dict[str, Any]:
-    """Return the configuration of the last run at a root; empty where there was none."""
+    """Return the configuration of the last run at a root; empty if there was none."""
     return (
         root.read_json(CONFIG, UsageError, remedy="remove it: the next run writes a new one")
         if root.exists(CONFIG)
@@ -42,10 +42,10 @@ def earlier_settings(root: DatasetRoot) -> dict[str, Any]:
 
 
 def check_settings(root: DatasetRoot, now: Mapping[str, Any], *, free: frozenset[str], made: str) -> None:
-    """Raise UsageError where finished items at a root were made with other settings, which would replace them.
+    """Raise UsageError if finished items at a root were made with other settings, or by another command.
 
-    Also where a root holds what another command makes. ``free`` names the sections and settings that decide nothing of the
-    items. ``made`` is what they are called, in the plural. Settings that the earlier version did not have are passed over.
+    ``free`` names the sections and settings that do not affect items. ``made`` is the plural noun for the items. Settings that
+    the earlier version did not have are ignored.
     """
     earlier = earlier_settings(root)
     if earlier and earlier.get("kind") != now["kind"]:

@@ -1,4 +1,4 @@
-"""A scene in SAPIEN 3: bodies, furniture, and their visuals where the scene has a renderer."""
+"""Scene in SAPIEN 3: bodies and furniture, with render shapes if the scene has a renderer."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PLAIN_COLORS: dict[str, tuple[float, float, float]] = {
     "marble": (0.85, 0.84, 0.82),
     "cloth": (0.35, 0.42, 0.55),
 }
-"""Linear RGB of the materials of furniture, where they have no texture."""
+"""Linear RGB of furniture materials without a texture."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ def add_to_sapien(
     *,
     visual: bool = True,
 ) -> SapienEntities:
-    """Add a recorded layout to a SAPIEN scene: the ``boxes`` of its furniture and its objects, whose ``twin`` is found by its id.
+    """Add a recorded layout to a SAPIEN scene: the ``boxes`` of its furniture, and its objects, looked up by ``twin``.
 
-    With ``visual``: textured meshes, plainly coloured furniture and the lights.
+    With ``visual``: textured meshes, plainly coloured furniture and lights.
     """
     materials = {box.name: box.material for box in record.furniture.boxes}
     furniture = {}

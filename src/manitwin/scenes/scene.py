@@ -1,4 +1,4 @@
-"""The scene file: which twins stand where, on what, under which lights. Positions in metres, world frame, +Z up."""
+"""Scene file: poses of twins, furniture, lights and cameras. Positions are in metres in the world frame, +Z up."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from pydantic import (
 )
 
 SCENE_SCHEMA_VERSION = 2
-"""Version 2 says what each object's twin was as it came to rest (``body_sha256``); version 1, its revision alone."""
+"""Version 2 adds the digest of each twin at the time of settling (``body_sha256``); version 1 has only its revision."""
 SCENE_SCHEMA_VERSIONS = (1, SCENE_SCHEMA_VERSION)
-"""Those that are read. A scene stays as it was written: tasks name it by its digest."""
+"""The versions that are read. A scene is never rewritten, because tasks refer to it by its digest."""
 SCENE = "scene.json"
 
 
 MOST_METRES = 1e6
-"""No number of a scene is larger: a coordinate of 1e300 ends simulations and pictures, not with one line."""
+"""Limit of all numbers in a scene: a coordinate of 1e300 would break simulation and rendering without a clear error."""
 
 
 def _name(text: str) -> str:
@@ -50,9 +50,9 @@ class SurfaceBox(_Record):
 
 
 class SupportRegion(_Record):
-    """A level rectangle that objects may stand on, along the world's axes; ``name`` is that of its box.
+    """A horizontal rectangle on which objects may stand, along the world axes; ``name`` is that of its box.
 
-    ``clearance_m`` is the free height above it; None where nothing is above.
+    ``clearance_m`` is the free height above it; None if nothing is above.
     """
 
     name: Name
@@ -63,10 +63,10 @@ class SupportRegion(_Record):
 
 
 class Furniture(_Record):
-    """The furniture that objects stand on: ``kind`` table, shelf or tray.
+    """Furniture of ``kind`` table, shelf or tray.
 
-    Objects stand on the ``supports``; ``support_height_m`` is the height of the lowest of these, 0 for a table. The table's
-    top is larger than the region on it that is sampled: a robot's base stands beside that.
+    Objects stand on the ``supports``; ``support_height_m`` is the height of the lowest one, 0 for a table. The table top is
+    larger than the sampled region on it, because the base of a robot stands beside that region.
     """
 
     kind: str
@@ -76,11 +76,11 @@ class Furniture(_Record):
 
 
 class SceneObject(_Record):
-    """A twin in the scene, at rest. ``supported_by`` is another object's name, or None for the furniture; ``relation`` on or in.
+    """A twin at rest in the scene. ``supported_by`` is another object's name, or None for the furniture; ``relation`` on or in.
 
-    ``placement`` is the index of the twin's placement that it stands in; None for what came to rest as it fell, in a
-    container. ``surface`` names the support that it, or what holds it, stands on. ``body_sha256`` is the digest of what decides
-    how the twin comes to rest (``manitwin.twin.record_digests``); None in scenes of earlier versions, which do not have the key.
+    ``placement`` is the index of the twin's placement; None for an object that settled after a drop into a container.
+    ``surface`` names the support below the object or its container. ``body_sha256`` is the digest of what determines the twin's
+    rest (``manitwin.twin.record_digests``); None in scenes of earlier versions, which lack the key.
     """
 
     name: Name
@@ -104,7 +104,7 @@ class SceneObject(_Record):
 
 
 class Light(_Record):
-    """A directional light; ``color`` is linear RGB with its strength."""
+    """A directional light; ``color`` is linear RGB times its intensity."""
 
     direction: _Vector
     color: _Vector
@@ -121,7 +121,7 @@ class SceneCamera(_Record):
 
 
 class SceneMeasures(_Record):
-    """Measurements by physics: how far objects moved and turned as they settled, and what was left of gaps."""
+    """Physical measurements: motion and rotation of objects while settling, penetration and remaining gaps."""
 
     max_moved_m: Number
     max_turned_rad: Number
@@ -130,7 +130,7 @@ class SceneMeasures(_Record):
 
 
 class SceneRecord(_Record):
-    """One layout; ``robot`` is whose workspace it was sampled for."""
+    """One layout; ``robot`` is the robot for whose workspace it was sampled."""
 
     schema_version: int
     scene_id: Name

@@ -1,4 +1,4 @@
-"""Scene files: where they lie in a run, ``SCENES/scenes/<thousand>/<scene_id>/scene.json``, and how they are read and written."""
+"""Scene files of a run, at ``SCENES/scenes/<thousand>/<scene_id>/scene.json``: paths, reading and writing."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ CONFIG = "config.json"
 
 
 def scene_bytes(record: SceneRecord) -> bytes:
-    """Return the content of a scene file: canonical JSON."""
+    """Return the content of a scene file as canonical JSON."""
     return canonical_json(record.model_dump(mode="json")).encode()
 
 
 def write_scene(record: SceneRecord, folder: Path) -> Path:
-    """Write ``folder/scene.json``; returns its path. Makes the folder where it is not there."""
+    """Write ``folder/scene.json``, making the folder if needed, and return its path."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / SCENE
     write_bytes_atomically(path, scene_bytes(record))
@@ -34,7 +34,7 @@ def write_scene(record: SceneRecord, folder: Path) -> Path:
 
 
 def read_scene(path: Path) -> SceneRecord:
-    """Read a scene file, or that of a scene's folder. Raises UsageError naming the file, the cause and the remedy."""
+    """Read a scene file, or that in a scene's folder. Raises UsageError naming the file, the cause and the remedy."""
     file = path / SCENE if path.is_dir() else path
     if not os.path.lexists(file):
         raise UsageError(f"{path}: it contains no {SCENE}; give a scene that `manitwin layout` made")
@@ -42,7 +42,7 @@ def read_scene(path: Path) -> SceneRecord:
 
 
 def parse_scene(content: bytes, path: str | Path = SCENE) -> SceneRecord:
-    """Read the content of a scene file; raises UsageError naming ``path``, the cause and the remedy."""
+    """Parse the content of a scene file; raises UsageError naming ``path``, the cause and the remedy."""
     data = parse_json_object(content, str(path), UsageError, remedy="sample the layout again")
     version = data.get("schema_version")
     if is_newer(version, SCENE_SCHEMA_VERSION):
@@ -61,15 +61,15 @@ def parse_scene(content: bytes, path: str | Path = SCENE) -> SceneRecord:
 
 
 def scene_name(scene_id: str) -> str:
-    """Return a scene's folder below the root: a thousand scenes share one."""
+    """Return a scene's folder below the root; a thousand scenes share a parent folder."""
     number = scene_id.rpartition("_")[2]
     return f"{SCENES}/{int(number) // 1000:04d}/{scene_id}"
 
 
 def scene_there(root: DatasetRoot, scene_id: str) -> bytes | None:
-    """Return the scene file of a run's scene; None where there is none that can be read.
+    """Return the content of a scene's file in a run; None if it is missing or unreadable.
 
-    Raises UsageError for one that a newer version of this package has written: it is not to be replaced.
+    Raises UsageError for a file that a newer version of this package wrote, which must not be replaced.
     """
     name = f"{scene_name(scene_id)}/{SCENE}"
     try:
@@ -87,7 +87,7 @@ def scene_there(root: DatasetRoot, scene_id: str) -> bytes | None:
 
 
 def dataset_of(scene: Path) -> str:
-    """Return the data set that a scene of a run was sampled from; raises UsageError where its folder does not say so."""
+    """Return the data set that a scene of a run was sampled from; raises UsageError if its folder does not state it."""
     for folder in scene.resolve().parents:
         if folder.name == SCENES and (folder.parent / CONFIG).is_file():
             said = read_json_object(
@@ -99,7 +99,7 @@ def dataset_of(scene: Path) -> str:
 
 
 def scene_ids(root: Path) -> list[str]:
-    """Return the ids of the accepted scenes below a root, sorted; raises UsageError where there are none."""
+    """Return the sorted ids of the accepted scenes below a root; raises UsageError if there are none."""
     found = sorted(path.parent.name for path in (root / SCENES).glob(f"*/*/{SCENE}"))
     if not found:
         raise UsageError(f"{root}: no scene there; `manitwin layout DATASET -o {root}` makes some")
@@ -107,7 +107,7 @@ def scene_ids(root: Path) -> list[str]:
 
 
 def scene_files(place: Path) -> list[Path]:
-    """Return the scene files at a place: a scene's file, that of a scene's folder, or all of a run; none where it has none."""
+    """Return the scene files at a path: a scene file, that in a scene's folder, or all of a run; empty if there are none."""
     if place.is_file():
         return [place] if place.name == SCENE else []
     if (place / SCENE).is_file():

@@ -1,4 +1,4 @@
-"""Settings of layouts: frozen sections, like those of a build."""
+"""Settings of layouts: frozen sections like those of a build."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manitwin.config import RunConfig, Section, Seed
 
 
 def application_run() -> RunConfig:
-    """Return how an application's run works: no tables are kept of what it makes, and no results of single stages."""
+    """Return the run settings of an application, which keeps neither index tables nor results of single stages."""
     return RunConfig(index_every=0, keep_work=False)
 
 
@@ -19,14 +19,14 @@ Count = Annotated[int, Field(le=MOST_OBJECTS)]
 
 
 class LayoutSettings(Section):
-    """Settings of a layout: its objects, their density, and the limits of their settling (metres, seconds, degrees).
+    """Settings of a layout: its objects, their density, and the limits while settling (metres, seconds, degrees).
 
-    ``objects`` is the least and the largest number. ``include`` names categories that must be there, one object for each
-    mention; the others are distractors. ``stacked`` objects stand on others, ``contained`` ones lie in a vessel. Without
-    ``min_gap_m`` the gap is that of the clutter level. ``upright``: what has an upright placement that stayed is put down in
-    one; what has none comes as it rests. ``workspace`` is where the named robot, or any, reaches from above:
-    least and largest radius about the origin, and half of the angle about +X. ``poses_tried`` bounds the places tried for an
-    object, ``repairs`` how many objects are sampled again before the layout is given up.
+    ``objects`` is the least and largest number. ``include`` names required categories, one object for each mention; the others
+    are distractors. ``stacked`` objects stand on others, ``contained`` ones lie in a container. Without ``min_gap_m``, the gap
+    is that of the clutter level. ``upright``: twins with a settled upright placement are placed in one, others as they rest.
+    ``workspace`` is the region that the named robot, or any robot, reaches from above: least and largest radius about the
+    origin, and half of the angle about +X. ``poses_tried`` limits the positions tried for an object, ``repairs`` the number of
+    objects that are sampled again before the layout is rejected.
     """
 
     objects: tuple[Count, Count] = (3, 12)
@@ -64,12 +64,12 @@ class LayoutSettings(Section):
 
     @property
     def least_standing(self) -> int:
-        """The least number of objects on the furniture: what is asked for, something below each stacked one, a vessel."""
+        """The least number of objects on the furniture: required objects, one below each stacked object, one container."""
         return max(len(self.include), self.stacked + min(self.contained, 1), 1)
 
 
 class LayoutsConfig(Section):
-    """Everything that decides what layouts are made. ``pictures``: also a picture, depth, normals and ids of each camera."""
+    """All settings that determine layouts. ``pictures``: also render colour, depth, normals and ids from each camera."""
 
     seed: Seed = 0
     layout: LayoutSettings = LayoutSettings()

@@ -1,4 +1,4 @@
-"""What pictures of scenes need of a twin, read once and kept from scene to scene."""
+"""Visual surfaces of twins for pictures of scenes, cached over scenes."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from manitwin.twin.mesh_files import read_visual
 from manitwin.twin.store import RECORD
 
 TWINS_KEPT, SIMPLIFIED_KEPT = 32, 64
-"""In one process: a textured twin takes some 10 MB, a simplified one less, and a CPU-second to make."""
+"""Cache sizes in a process: a textured twin takes some 10 MB; a simplified one takes less, and a CPU-second to make."""
 
 
 def twin_looks(folder: Path, picture_px: int) -> Drawable:
-    """Return a twin's visual surface, as it is, for pictures of ``picture_px``; raises TwinError.
+    """Return a twin's visual surface without simplification, for pictures of ``picture_px``; raises TwinError.
 
-    Its textures get at most twice the pixels each way that a whole picture has, which is what is drawn before it is reduced.
+    Its textures get at most twice the side of a picture in pixels, which is the resolution before downsampling.
     """
     return _looks(folder, _version(folder), 2 * picture_px)
 
 
 def simplified_twin_looks(folder: Path, tolerance_m: float) -> Drawable:
-    """Return a twin's visual surface for small pictures, simplified by about a tolerance; raises TwinError."""
+    """Return a twin's visual surface for small pictures, simplified with about this tolerance; raises TwinError."""
     return _simplified_looks(folder, _version(folder), tolerance_m)
 
 
 def seen_shape(folder: Path) -> SeenShape:
-    """Return a twin as rays see it; raises TwinError."""
+    """Return a twin's surface for ray casting; raises TwinError."""
     return _shape(folder, _version(folder))
 
 
@@ -48,9 +48,9 @@ def _shape(folder: Path, version: tuple[int, int]) -> SeenShape:
 
 
 def _version(folder: Path) -> tuple[int, int]:
-    """Tell a twin from one that was built again in its place."""
+    """Return a cache key that changes when a twin is rebuilt in place."""
     try:
         found = (folder / RECORD).stat()
     except OSError:
-        return 0, 0  # reading the twin says what is wrong
+        return 0, 0  # reading the twin reports the error
     return found.st_mtime_ns, found.st_size

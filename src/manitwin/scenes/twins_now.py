@@ -1,4 +1,4 @@
-"""Whether the twins of scenes are those that came to rest in them: one that was made again may stand otherwise."""
+"""Detection of twins that were rebuilt after a scene was sampled, and may rest differently now."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ RESAMPLE = "sample the layouts again into a new folder, or name the data set as 
 
 @dataclass(frozen=True)
 class ChangedTwins:
-    """The twins of scenes that are others than in these, by id with their category.
+    """Twins that differ from those in scenes, by id with their category.
 
-    ``changed`` have other hulls, another mass, contact or placements, or are no accepted twins any more. Of ``unknown`` a scene
-    of an earlier version has another revision, which a retired grasp makes as well as another shape.
+    ``changed`` have other hulls, another mass, contact or placements, or are not accepted any more. ``unknown`` have another
+    revision than a scene of an earlier version, which may result from a retired grasp as well as from another shape.
     """
 
     changed: Mapping[str, str]
@@ -32,7 +32,7 @@ class ChangedTwins:
 
     @property
     def line(self) -> str | None:
-        """A line that names what has changed; None where nothing has."""
+        """A line that names the changed twins; None if there are none."""
         if not self.changed:
             return None
         return (
@@ -42,7 +42,7 @@ class ChangedTwins:
 
     @property
     def remark(self) -> str | None:
-        """A line on twins of which nobody knows whether they have changed; None where there are none."""
+        """A line on twins of which it is unknown whether they changed; None if there are none."""
         if not self.unknown:
             return None
         return (
@@ -52,9 +52,9 @@ class ChangedTwins:
 
 
 def changed_twins(scenes: Iterable[SceneRecord], now: Callable[[str], TwinState | None]) -> ChangedTwins:
-    """Compare the twins of scenes with what they are ``now``: None for one that is no accepted twin any more.
+    """Compare the twins of scenes with their current states, where ``now`` returns None for one that is not accepted any more.
 
-    Twins whose records cannot be read (TwinError) are left out.
+    Twins with unreadable records (TwinError) are skipped.
     """
     changed: dict[str, str] = {}
     unknown: dict[str, str] = {}
@@ -65,7 +65,7 @@ def changed_twins(scenes: Iterable[SceneRecord], now: Callable[[str], TwinState 
         for each in scene.objects:
             try:
                 state = now(each.twin_id)
-            except TwinError:  # what reads it says so, of what is made with it alone
+            except TwinError:  # reading the twin reports the error, only for what uses it
                 continue
             if state is not None and each.body_sha256 is None and state.revision != each.revision:
                 unknown[each.twin_id] = each.category
@@ -77,9 +77,9 @@ def changed_twins(scenes: Iterable[SceneRecord], now: Callable[[str], TwinState 
 
 
 class StatesNow:
-    """What the twins of a data set are now, each read once: call it with an id. None for one that was rejected.
+    """The current states of a data set's twins, each read once: call it with an id. None for a rejected twin.
 
-    Raises UsageError where there is no such twin, TwinError where its record cannot be read.
+    Raises UsageError for a missing twin, TwinError for an unreadable record.
     """
 
     def __init__(self, twins: TwinSource):
@@ -87,7 +87,7 @@ class StatesNow:
         self.states: dict[str, TwinState | None] = {}
 
     def __call__(self, twin_id: str) -> TwinState | None:
-        """Return what a twin is now."""
+        """Return the current state of a twin."""
         if twin_id not in self.states:
             name = f"{self._twins.root.url}: {twin_id}/{RECORD}"
             said = parse_json_object(self._twins.record_bytes(twin_id), name, TwinError, remedy=REMEDY)
@@ -97,7 +97,7 @@ class StatesNow:
 
 
 def require_same_twins(scenes: Iterable[SceneRecord], twins: TwinSource, place: str) -> tuple[StatesNow, list[str]]:
-    """Return what the twins of scenes are now, and remarks; raises UsageError naming ``place`` where one stands otherwise."""
+    """Return the current states of the twins of scenes, and remarks; raises UsageError naming ``place`` if one changed."""
     now = StatesNow(twins)
     found = changed_twins(scenes, now)
     if found.line is not None:

@@ -84,11 +84,11 @@ def audit_all(
     engines: Sequence[str] = (),
     engine: str | None = None,
 ) -> Iterator[Audited]:
-    """Audit assets in ``jobs`` processes and yield what was found in the order of the paths.
+    """Audit assets in ``jobs`` processes and yield the results in the order of the paths.
 
-    ``engines`` are those that each is run in (``check_engines``), ``engine`` the one whose reading of collision shapes is judged.
-    ``named`` are the folders that the user gave: what an asset names is read below them (``root_of``).
-    One that brings its process down, hangs or takes too much memory costs itself alone: it is a finding of it.
+    ``engines`` are those in which each asset is simulated (``check_engines``), ``engine`` the one whose interpretation of
+    collision shapes is audited. ``named`` are the folders that the user gave, below which the files that assets name are read
+    (``root_of``). An asset that crashes its process, hangs or uses too much memory gets a finding and does not affect others.
     """
     if jobs > 1 and len(paths) > 1:
         with _one_thread_each():

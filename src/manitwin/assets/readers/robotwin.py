@@ -86,7 +86,7 @@ def read(path: Path) -> Asset:
 def _parts(
     files: AssetFiles, folder: Path, kind: str, number: str, scale: np.ndarray
 ) -> list[tuple[trimesh.Trimesh, Path]]:
-    """Return the parts of the mesh that RoboTwin would take, scaled: GLB before OBJ, in its folder before beside it."""
+    """Return the scaled parts of the mesh that RoboTwin would load: GLB before OBJ, in its subfolder before beside it."""
     names = (f"base{number}.glb", f"textured{number}.obj")
     candidates = [place / name for place in (folder / kind, folder) for name in names]
     found = files.find(f"{kind}/{names[0]}", candidates)

@@ -18,8 +18,9 @@ _FASTEST = 1e6
 _NOT_OF_TWINS = (
     "physxJoint:armature", "newton:armature", "mjc:armature", "mjc:stiffness", "physxJoint:jointFriction",
 )  # fmt: skip
-"""Attributes that twins have no field for. PhysX's jointFriction is a coefficient that scales with the joint force, not a
-friction force or torque.
+"""Attributes that twins have no field for.
+
+PhysX's jointFriction is a coefficient that scales with the joint force, not a friction force or torque.
 """
 
 

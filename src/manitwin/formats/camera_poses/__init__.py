@@ -1,1 +1,1 @@
-"""Where cameras stood and how they were turned, as programs that estimate or render it write it down."""
+"""Readers of camera poses and lenses, as written by programs that estimate or render them."""

@@ -1,4 +1,4 @@
-"""Read the cameras and images of a COLMAP model, text or binary (colmap.github.io/format.html); its points are not needed."""
+"""Reader of the cameras and images of a COLMAP model, text or binary (colmap.github.io/format.html); points are skipped."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from manitwin.formats.printable import printable_line
 CAMERAS, IMAGES = "cameras", "images"
 _MAX_BYTES = 4 << 30
 _LONGEST_LINE, _LONGEST_NAME = 1 << 26, 4096
-_POINT_BYTES = 24  # x, y and a point's number
+_POINT_BYTES = 24  # x, y and the id of a point
 _SHOWN = 80
 MODELS = (
     ("SIMPLE_PINHOLE", 3), ("PINHOLE", 4), ("SIMPLE_RADIAL", 4), ("RADIAL", 5), ("OPENCV", 8), ("OPENCV_FISHEYE", 8),
     ("FULL_OPENCV", 12), ("FOV", 5), ("SIMPLE_RADIAL_FISHEYE", 4), ("RADIAL_FISHEYE", 5), ("THIN_PRISM_FISHEYE", 12),
 )  # fmt: skip
-"""Names and numbers of parameters, by COLMAP's own numbers (``src/colmap/sensor/models.h``)."""
+"""Names and numbers of parameters, by COLMAP's model ids (``src/colmap/sensor/models.h``)."""
 NOT_READ = frozenset({"FOV", "THIN_PRISM_FISHEYE"})
 
 _refused = partial(InputError, "unreadable")
 
 
 def model_files(folder: Path) -> tuple[Path, Path] | None:
-    """Return the files of cameras and of images of a model in a folder, text before binary; None where there is none."""
+    """Return the cameras and images files of a model in a folder, text before binary; None if there are none."""
     for suffix in (".txt", ".bin"):
         files = folder / f"{CAMERAS}{suffix}", folder / f"{IMAGES}{suffix}"
         if all(file.is_file() for file in files):
@@ -43,7 +43,7 @@ def model_files(folder: Path) -> tuple[Path, Path] | None:
 
 
 def read_model(cameras: Path, images: Path) -> list[PosedCamera]:
-    """Return the cameras of a model's images, in the order of their names; raises InputError with one line."""
+    """Return the cameras of a model's images, sorted by name; raises InputError with one line."""
     binary = images.suffix == ".bin"
     try:
         with open_regular(cameras, _refused) as stream:
@@ -101,7 +101,7 @@ def _lens(model: str, size_px: tuple[float, float], values: tuple[float, ...]) -
     at = 1 if one else 2
     bent = values[at + 2 :]
     fisheye = model.endswith("FISHEYE")
-    # OpenCV counts two radial coefficients, two tangential ones, then the others; its fisheye model has four radial ones
+    # OpenCV's order is two radial, two tangential, then the other radial coefficients; its fisheye model has four radial ones
     distortion = (*bent, *([0.0] * (4 - len(bent)))) if bent else ()
     return Lens(focal, (values[at], values[at + 1]), size_px, distortion=distortion, fisheye=fisheye)
 
@@ -118,15 +118,15 @@ def _text_lenses(stream: BinaryIO) -> Iterator[tuple[int, Lens]]:
 
 _POINT_ID = re.compile(r"-?[0-9]+")
 _Image = tuple[tuple[float, ...], tuple[float, ...], int, str]
-"""Quaternion wxyz, translation, the number of the camera, name."""
+"""Quaternion wxyz, translation, camera id, name."""
 
 
 def _text_images(stream: BinaryIO) -> Iterator[_Image]:
-    """Yield images; behind the line of each stands one of its points, which some programs leave out."""
+    """Yield images; the line of each is followed by a line of its points, which some programs omit."""
     points_expected, count = False, 0
     for line in _lines(stream):
         words = line.split(maxsplit=9)
-        is_image = len(words) == 10 and not _POINT_ID.fullmatch(words[9].split()[-1])  # a name, and no point's number
+        is_image = len(words) == 10 and not _POINT_ID.fullmatch(words[9].split()[-1])  # a name rather than a point's id
         if points_expected and not is_image:
             points_expected = False
             continue

@@ -1,4 +1,4 @@
-"""Which of a file's cameras took which photo: by its name, and by the folders at its end where names are the same."""
+"""Matching of photos with the cameras of a file, by name, and by trailing folders where names are the same."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _SHOWN = 3
 
 
 def cameras_of(photos: Sequence[Path], cameras: Sequence[PosedCamera], called: str) -> list[PosedCamera | None]:
-    """Return the camera of each photo, None where the file ``called`` so has none.
+    """Return the camera of each photo, None if the file named ``called`` has none.
 
-    Names are compared and nothing is opened by them. A name in the file may lack its suffix, or have that of another format.
-    Raises InputError where a photo may be of several cameras, and two photos of one.
+    Only names are compared; no file is opened. A name in the file may lack its suffix, or have that of another format. Raises
+    InputError if a photo matches several cameras, or two photos match one.
     """
     parts = [_parts(camera.file) for camera in cameras]
     by_stem: dict[str, list[int]] = {}
@@ -38,7 +38,7 @@ def cameras_of(photos: Sequence[Path], cameras: Sequence[PosedCamera], called: s
 
 def _camera_of(photo: Path, parts: Sequence[tuple[str, ...]], by_stem: dict[str, list[int]], called: str) -> int | None:
     own = photo.parts
-    # of photos that differ in their suffixes alone, the one that has the photo's own
+    # among photos that differ only in the suffix, the one with the photo's own suffix
     for key in (own[-1], _stem(own[-1])):
         likely = by_stem.get(key, [])
         if not likely:
@@ -66,7 +66,7 @@ def _stem(name: str) -> str:
 
 
 def _same_end(one: Sequence[str], other: Sequence[str]) -> int:
-    """Return in how many folders from the end two paths agree."""
+    """Return the number of trailing folders in which two paths agree."""
     same = 0
     for first, second in zip(reversed(one), reversed(other), strict=False):
         if first != second:

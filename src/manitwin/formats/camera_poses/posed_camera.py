@@ -1,4 +1,4 @@
-"""A camera as a file of poses states it: where it stood, how it was turned, and its lens."""
+"""Camera of a file of poses: position, rotation and lens."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from manitwin.errors import InputError
 
 MOST_CAMERAS = 100_000
 LARGEST_NUMBER = 1e9
-"""Of a length, a focal length or a place in a picture: larger ones are those of no photos of an object."""
+"""Limit of lengths, focal lengths and picture coordinates; photos of an object have smaller ones."""
 MOST_COEFFICIENT = 100.0
-"""Of a lens's distortion; those of real lenses are below 10."""
-_ROUNDED = 0.01  # by which the axes of a rotation, as files round them, are off 1 and right angles
+"""Limit of distortion coefficients; those of real lenses are below 10."""
+_ROUNDED = 0.01  # tolerance for rounded rotations: deviation of axes from unit length and right angles
 
 
 @dataclass(frozen=True)
 class Lens:
-    """A lens, for a picture of ``size_px`` (width, height); a size or a middle that is None is the photo's own.
+    """A lens, for a picture of ``size_px`` (width, height); a size or centre of None is that of the photo.
 
-    ``focal`` and ``centre_px`` are along x and y, in pixels whose middles are at one half; with ``in_widths`` the focal length is
-    in widths of the picture. ``distortion`` are OpenCV's coefficients (k1, k2, p1, p2, k3, k4, k5, k6), with ``fisheye`` those of
-    its fisheye model (k1, k2, k3, k4); all 0 where there is none.
+    ``focal`` and ``centre_px`` are along x and y, in pixels whose centres are at one half; with ``in_widths``, the focal length
+    is in widths of the picture. ``distortion`` are OpenCV's coefficients (k1, k2, p1, p2, k3, k4, k5, k6), with ``fisheye``
+    those of its fisheye model (k1, k2, k3, k4); empty without distortion.
     """
 
     focal: tuple[float, float]
@@ -35,7 +35,7 @@ class Lens:
     fisheye: bool = False
 
     def of_picture(self, width: int, height: int) -> Lens:
-        """Return the lens with all that it leaves to the photo, whose uncropped size is given."""
+        """Return the lens with unset values filled in from the photo's uncropped size."""
         size = self.size_px or (float(width), float(height))
         factor = size[0] if self.in_widths else 1.0
         return replace(
@@ -49,10 +49,11 @@ class Lens:
 
 @dataclass(frozen=True)
 class PosedCamera:
-    """A camera that took the picture ``file`` (as the file of poses calls it).
+    """A camera that took the picture ``file`` (its name in the file of poses).
 
-    ``world_to_camera (3, 4)`` takes points of a world to the camera's frame: x right, y down, z forward. Where that world was
-    turned since, ``as_read (3, 4)`` is that of the file's own. ``mask`` is the outline's picture that the file names.
+    ``world_to_camera (3, 4)`` maps world points to the camera's frame: x right, y down, z forward. If the world was rotated
+    after reading, ``as_read (3, 4)`` is the transform from the file's own world. ``mask`` is the path of the object mask that
+    the file names.
     """
 
     file: str
@@ -63,9 +64,9 @@ class PosedCamera:
 
 
 def turned_upright(camera: PosedCamera, orientation: int) -> PosedCamera:
-    """Return a camera of a stored picture as that of the picture turned upright by its EXIF ``orientation``, 6 or 8.
+    """Convert the camera of a stored picture to that of the picture rotated upright by EXIF ``orientation`` 6 or 8.
 
-    Its lens says the size and the middle of the picture. By 6 the stored picture is shown turned clockwise by a right angle, by 8
+    Its lens must state size and centre of the picture. Orientation 6 rotates the stored picture clockwise by a right angle, 8
     counter-clockwise.
     """
     lens, clockwise = camera.lens, orientation == 6
@@ -73,7 +74,7 @@ def turned_upright(camera: PosedCamera, orientation: int) -> PosedCamera:
     turn = np.array([[0, -1.0, 0], [1.0, 0, 0], [0, 0, 1.0]])
     turn = turn if clockwise else turn.T
     bent = list(lens.distortion)
-    if not lens.fisheye and len(bent) > 3:  # those of a lens that is out of its axis turn too
+    if not lens.fisheye and len(bent) > 3:  # tangential coefficients rotate too
         bent[2:4] = [bent[3], -bent[2]] if clockwise else [-bent[3], bent[2]]
     upright = replace(
         lens,
@@ -86,10 +87,10 @@ def turned_upright(camera: PosedCamera, orientation: int) -> PosedCamera:
 
 
 def rigid(matrix: np.ndarray, told: str) -> np.ndarray:
-    """Return a transform ``(3, 4)`` whose rotation is one to the last digit.
+    """Return a transform ``(3, 4)`` with its rotation orthonormalized.
 
-    Raises InputError, with ``told`` before the cause, for numbers that are none or too large, for axes that are not of length 1
-    and at right angles, and for a mirror.
+    Raises InputError, with ``told`` before the cause, for invalid or too large numbers, axes that are not orthonormal, and
+    reflections.
     """
     if not np.isfinite(matrix).all() or np.abs(matrix).max() > LARGEST_NUMBER:
         raise InputError("unreadable", f"{told}: a number is not finite or above {LARGEST_NUMBER:g}; correct the file")
@@ -110,7 +111,7 @@ def rigid(matrix: np.ndarray, told: str) -> np.ndarray:
 
 
 def checked_lens(lens: Lens, told: str) -> Lens:
-    """Return a lens that a picture can be taken with; raises InputError with ``told`` before the cause."""
+    """Return the lens if its values are valid; raises InputError with ``told`` before the cause."""
     numbers = [*lens.focal, *(lens.centre_px or ()), *(lens.size_px or ())]
     if not all(math.isfinite(each) and abs(each) <= LARGEST_NUMBER for each in numbers):
         raise InputError(

@@ -1,4 +1,4 @@
-"""Read the poses of cameras from a transforms.json or a model of COLMAP."""
+"""Reading of camera poses from a transforms.json or a COLMAP model."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GIVE = "give a transforms.json (NeRF, instant-ngp, nerfstudio) or the folder of 
 
 @dataclass(frozen=True)
 class CameraPoses:
-    """The cameras of a file; ``unit_m`` is how many metres the unit of its world is, None where it does not say."""
+    """The cameras of a file; ``unit_m`` is the length of its world's unit in metres, None if not stated."""
 
     format: Literal["transforms.json", "colmap"]
     file: Path
@@ -38,7 +38,7 @@ def read_camera_poses(path: Path) -> CameraPoses:
             return read_camera_poses(path / "transforms.json")
         if files is None:
             raise InputError("unreadable", f"{called}: no {CAMERAS} and {IMAGES} of a COLMAP model found; {GIVE}")
-        if not path.is_dir():  # in the format, text or binary, of the file that was named
+        if not path.is_dir():  # in the format, text or binary, of the given file
             files = folder / f"{CAMERAS}{path.suffix}", folder / f"{IMAGES}{path.suffix}"
         return CameraPoses("colmap", folder, tuple(read_model(*files)), None)
     if path.suffix.lower() != ".json":

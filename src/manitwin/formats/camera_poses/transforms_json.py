@@ -1,4 +1,4 @@
-"""Read ``transforms.json`` as NeRF's synthetic scenes, instant-ngp and nerfstudio have it: OpenGL cameras, poses to world."""
+"""Reader and writer of ``transforms.json`` of NeRF's synthetic scenes, instant-ngp and nerfstudio: OpenGL poses to world."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from manitwin.formats.json_file import json_number, read_json_object
 from manitwin.formats.printable import printable_line
 
 OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0])
-"""Takes x right, y up, z backward to x right, y down, z forward."""
+"""Maps x right, y up, z backward to x right, y down, z forward."""
 UNITS = {
     **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
     **dict.fromkeys(("cm", "centimetre", "centimetres", "centimeter", "centimeters"), 0.01),
     **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), 0.001),
 }
-"""Metres of the unit that a file may state under the key ``units``; the format itself has none."""
+"""Metres of the unit that a file may state under the key ``units``; the format itself defines none."""
 _PINHOLE = frozenset({"OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV", "PERSPECTIVE"})
 _FISHEYE = frozenset({"OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "FISHEYE"})
 _PINHOLE_NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
@@ -34,10 +34,10 @@ _refused = partial(InputError, "unreadable")
 
 
 def read_transforms(path: Path) -> tuple[list[PosedCamera], float | None]:
-    """Return the cameras of a file in its order, and how many metres its unit is, None where it does not say.
+    """Return the cameras of a file in its order, and the length of its unit in metres, None if not stated.
 
-    What a frame says of its lens goes before what the file says. A frame's ``mask_path`` is one below the file's folder; whether
-    it is there is not asked. Raises InputError with one line.
+    Lens values of a frame override those of the file. A frame's ``mask_path`` is relative to the file's folder; its existence
+    is not checked. Raises InputError with one line.
     """
     document = read_json_object(path, _refused)
     frames = document.get("frames")
@@ -56,9 +56,9 @@ def read_transforms(path: Path) -> tuple[list[PosedCamera], float | None]:
 def transforms_of(
     cameras: Sequence[PosedCamera], names: Sequence[str], unit_m: float | None, masks: Mapping[Path, str]
 ) -> dict[str, Any]:
-    """Return the content of a transforms.json for photos called ``names``; each lens is one of ``Lens.of_picture``.
+    """Return the content of a transforms.json for photos called ``names``; each lens is a result of ``Lens.of_picture``.
 
-    ``masks`` says what the masks of the cameras are called.
+    ``masks`` maps the masks of the cameras to their names.
     """
     document: dict[str, Any] = {} if unit_m is None else {"units": next(k for k, v in UNITS.items() if v == unit_m)}
     return document | {"frames": [_frame(camera, name, masks) for camera, name in zip(cameras, names, strict=True)]}
@@ -97,7 +97,7 @@ def _camera(path: Path, number: int, frame: Any, document: Mapping[str, Any]) ->
 
 
 def _said_of_lens(document: Mapping[str, Any], frame: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is said of a frame's lens: a focal length of its own takes the place of all that the file says of one."""
+    """Return the lens values of a frame: its own focal length replaces all focal values of the file."""
     own = any(frame.get(key) is not None for key in _FOCAL)
     return {**{key: value for key, value in document.items() if not (own and key in _FOCAL)}, **frame}
 

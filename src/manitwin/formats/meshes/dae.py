@@ -1,4 +1,4 @@
-"""COLLADA 1.4 meshes (.dae)."""
+"""Reader of COLLADA 1.4 meshes (.dae)."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ _REMEDY = "export it again, or as glTF 2.0"
 _MAX_BYTES = 512 << 20
 _MAX_NODES = 8_000_000
 _NOT_FOUND = "Geometry #"
-"""What a node says of a shape that was left out before, whose own cause tells more."""
+"""pycollada's message for a node whose shape was left out before for another reason, which is more informative."""
 _OF_SHAPES = re.compile(
     r"Corrupted (?!color)|Failed to parse \w+ transform|Geometry #|.*\b(?:triangles|polylist|polygons)\b"
 )
-"""How pycollada tells what it could not read of shapes and nodes, and not of materials, lights and cameras."""
+"""Messages of pycollada about unreadable shapes and nodes, as opposed to materials, lights and cameras."""
 _END_OF_ARCHIVE = b"PK\x05\x06"
 
 
 def read_dae(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
-    """Read a COLLADA file: parts with node transforms baked, its unit in metres, its up axis 'x' | 'y' | 'z'.
+    """Read a COLLADA file: parts with node transforms applied, its unit in metres, its up axis 'x' | 'y' | 'z'.
 
-    A file without <unit> or <up_axis> gives None for them. Raises InputError ``unreadable``,
-    ``animated`` (skinned meshes).
+    Unit and up axis are None for a file without <unit> or <up_axis>. Raises InputError ``unreadable``, ``animated`` (skinned
+    meshes).
     """
     data = source.data()
     _check_size(data, source)
@@ -53,7 +53,7 @@ def read_dae(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, s
     try:
         data = _without_comments(data, source)
         document = _without_broken_materials(_document(data), data, source)
-        with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
+        with np.errstate(all="ignore"):  # overflows are found when vertices are checked
             parts = _parts(document, source)
         _tell_of_lost_shapes(document, parts, source)
     except collada.common.DaeError as error:
@@ -66,7 +66,7 @@ def _document(data: bytes) -> Any:
 
 
 def _without_comments(data: bytes, source: MeshSource) -> bytes:
-    """Return a document without comments: pycollada leaves out a mesh that has one among its shapes."""
+    """Return a document without comments: pycollada skips a mesh with a comment among its primitives."""
     if b"<!--" not in data:
         return data
     refusal = partial(InputError, "unreadable")
@@ -76,7 +76,7 @@ def _without_comments(data: bytes, source: MeshSource) -> bytes:
 
 
 def _without_broken_materials(document: Any, data: bytes, source: MeshSource) -> Any:
-    """Return a document whose shapes name no material that could not be read: pycollada leaves out such shapes as a whole."""
+    """Remove references to unreadable materials, because pycollada skips shapes that have them."""
     known = {material.id for material in document.materials}
     refusal = partial(InputError, "unreadable")
     root = parse_xml(data, "COLLADA", source.path.name, refusal=refusal, comments=False, max_bytes=None)
@@ -91,7 +91,7 @@ def _without_broken_materials(document: Any, data: bytes, source: MeshSource) ->
 
 
 def _tell_of_lost_shapes(document: Any, parts: list[trimesh.Trimesh], source: MeshSource) -> None:
-    """Note the shapes and nodes that pycollada leaves out as broken, with the first cause; raises InputError without any left."""
+    """Remark on shapes and nodes that pycollada skipped as broken, with the first cause; raises InputError if none are left."""
     said = [str(each).rpartition(f"{type(each).__name__}: ")[2] for each in document.errors]
     lost = sorted((each for each in said if _OF_SHAPES.match(each)), key=lambda each: each.startswith(_NOT_FOUND))
     if lost and not parts:
@@ -102,7 +102,7 @@ def _tell_of_lost_shapes(document: Any, parts: list[trimesh.Trimesh], source: Me
 
 
 def _check_size(data: bytes, source: MeshSource) -> None:
-    """Refuse what would take many times its size of memory as a tree, and an archive inside, which pycollada would open."""
+    """Refuse a document whose tree would need many times its size, and an embedded archive, which pycollada would open."""
     if len(data) > _MAX_BYTES or data.count(b"<") + data.count(b"=") > _MAX_NODES:
         raise source.too_large(f"more than {_MAX_BYTES >> 20} MiB or {_MAX_NODES} elements", "export it as glTF 2.0")
     if _END_OF_ARCHIVE in data:
@@ -128,7 +128,7 @@ def _inspect(data: bytes, source: MeshSource) -> tuple[float | None, str | None,
 
 
 def _instances(root: etree._Element) -> int:
-    """Count the nodes that instances of instances stand for without walking them: a short file can ask for billions."""
+    """Count the nodes after expanding nested instances, without walking them: a short file can request billions."""
     nodes = {node.get("id"): node for node in root.iter("{*}node") if node.get("id")}
     counts: dict[etree._Element, int] = {}
     open_nodes: set[etree._Element] = set()

@@ -1,4 +1,4 @@
-"""Which geometries of a COLLADA file its nodes show: descriptions name a node, a mesh's parts are named by their geometry."""
+"""Geometries shown by the nodes of a COLLADA file: descriptions name nodes, while mesh parts are named by geometry."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from manitwin.formats.xml_file import parse_xml
 
 
 def geometries_of_nodes(path: Path, max_bytes: int, inside: Path) -> dict[str, frozenset[str]]:
-    """Return the ids of the geometries that each node of a name shows; a geometry that no node is called like has its own.
+    """Return the ids of the geometries shown by the nodes of each name; a geometry's own name maps to itself if no node has it.
 
-    Gazebo calls the parts of a mesh by their nodes (ColladaLoader, ``currentNodeName``). Raises AssetError where the file cannot
+    Gazebo names the parts of a mesh by their nodes (ColladaLoader, ``currentNodeName``). Raises AssetError if the file cannot
     be read.
     """
     data = read_bytes(path, max_bytes, AssetError, inside=inside)

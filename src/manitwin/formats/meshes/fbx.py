@@ -1,4 +1,4 @@
-"""Meshes of FBX files, as game engines and stores of assets have them, read by the Open Asset Import Library (Assimp)."""
+"""Reader of FBX meshes, common in game engines and asset stores, by the Open Asset Import Library (Assimp)."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ INSTALL = "pip install 'manitwin[fbx]'"
 _LIMITS = Limits(seconds=300.0)
 _OLDEST = 7100
 _HEADER_BYTES = 27
-"""Of a binary file: its name, two bytes, and its version in four."""
+"""Of a binary file: its name, two bytes, and four bytes of version."""
 _REMEDY = "export it again as FBX 7.4 (2014) or glTF 2.0"
 _DIFFUSE, _BASE_COLOR, _NORMALS = 1, 12, 6
 """Kinds of textures (Assimp, ``aiTextureType``)."""
 _BOUND = b"Deformer"
-"""Names the objects of an FBX file that move vertices: skeletons and morph targets."""
+"""Class name of FBX objects that deform vertices: skeletons and morph targets."""
 _DEEPEST = 200
 
 
 @dataclass(frozen=True)
 class FbxMesh:
-    """A mesh in a place: ``vertices`` (V, 3) in its own frame, ``faces`` (F, 3), its transform (4, 4) to metres with Y up.
+    """A placed mesh: ``vertices`` (V, 3) in its own frame, ``faces`` (F, 3), its transform (4, 4) to metres with Y up.
 
-    ``uv`` (V, 2) has its origin at the lower left, ``colors`` (V, 4) are in 0..1; ``material`` counts in the file.
+    ``uv`` (V, 2) has its origin at the lower left, ``colors`` (V, 4) are in 0..1; ``material`` is an index in the file.
     """
 
     name: str
@@ -59,7 +59,7 @@ class FbxMesh:
 
 @dataclass(frozen=True)
 class FbxMaterial:
-    """A material: ``color`` RGB, ``opacity``, and the names of its textures as the file writes them."""
+    """A material: ``color`` RGB, ``opacity``, and the names of its textures as written in the file."""
 
     name: str
     color: tuple[float, float, float]
@@ -69,9 +69,9 @@ class FbxMaterial:
 
 
 def read_fbx(source: MeshSource) -> tuple[list[trimesh.Trimesh], float, Literal["y"]]:
-    """Read all meshes of an FBX file: parts in its unit with Y up, whatever axes it says, transforms baked; unit in metres.
+    """Read all meshes of an FBX file: parts in its unit, with transforms applied and Y up whatever its axes; unit in metres.
 
-    Raises InputError ``wrong_type`` where what ``manitwin[fbx]`` installs is missing, ``unreadable``, ``too_large``.
+    Raises InputError ``wrong_type`` if the packages of ``manitwin[fbx]`` are not installed, ``unreadable``, ``too_large``.
     """
     if find_spec("assimp_py") is None:
         raise source.refused("wrong_type", "the FBX reader is not installed", f"{INSTALL}, or export it as glTF 2.0")
@@ -101,21 +101,22 @@ def read_fbx(source: MeshSource) -> tuple[list[trimesh.Trimesh], float, Literal[
 def scene_of(data: bytes, max_faces: int) -> tuple[list[FbxMesh], list[FbxMaterial]]:
     """Return the meshes and materials of an FBX file's content.
 
-    To be run in a process of its own. Raises ValueError for what Assimp cannot read, OverflowError for more than ``max_faces``.
+    To be run in an isolated process. Raises ValueError for content that Assimp cannot read, OverflowError above ``max_faces``.
     """
     import assimp_py
 
     flags = (
         assimp_py.Process_Triangulate
-        | assimp_py.Process_SortByPType  # points and lines are meshes by themselves
+        | assimp_py.Process_SortByPType  # separates points and lines from triangles
         | assimp_py.Process_GlobalScale  # to metres
     )
-    with tempfile.TemporaryDirectory() as folder:  # it chooses its reader by the name, and must not meet other files
+    # Assimp chooses its reader by the name, and must not find other files
+    with tempfile.TemporaryDirectory() as folder:
         place = Path(folder) / "scene.fbx"
         place.write_bytes(data)
         try:
             scene = assimp_py.import_file(str(place), flags)
-        except (RuntimeError, ValueError, TypeError) as error:  # its words may be those of the file before
+        except (RuntimeError, ValueError, TypeError) as error:  # its message may belong to a previous file
             only = "its FBX is broken, or contains only points, lines and curved surfaces"
             mixed = "it holds points or lines beside its meshes, which its reader cannot leave out"
             raise ValueError(mixed if "assumes triangulated" in str(error) else only) from None
@@ -139,7 +140,7 @@ def scene_of(data: bytes, max_faces: int) -> tuple[list[FbxMesh], list[FbxMateri
 
 
 def _version(data: bytes) -> int | None:
-    """Return the version, such as 7400, that an FBX file says at its beginning; None where it says none."""
+    """Return the version, such as 7400, at the start of an FBX file; None if there is none."""
     if data.startswith(FBX_BINARY) and len(data) >= _HEADER_BYTES:
         return int.from_bytes(data[_HEADER_BYTES - 4 : _HEADER_BYTES], "little")
     said = FBX_TEXT.match(data[:100].decode("latin-1").lstrip())
@@ -190,7 +191,7 @@ def _material(told: FbxMaterial, held: dict[str, bytes], source: MeshSource) -> 
 
 
 def _texture(name: str | None, held: dict[str, bytes], source: MeshSource) -> Any:
-    """Return a texture that the file holds, or one that lies beside it."""
+    """Return a texture that is embedded in the file or lies beside it."""
     if not name:
         return None
     data = held.get(beside(name).rpartition("/")[2])

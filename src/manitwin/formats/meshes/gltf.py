@@ -1,4 +1,4 @@
-"""Meshes of glTF 2.0 documents, as .glb and as .gltf with files beside it."""
+"""Reader of glTF 2.0 meshes, as .glb and as .gltf with side files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from manitwin.formats.meshes.textures import (
     without_unused_vertices,
 )
 
-# required extensions that change nothing of the geometry, or that are understood here
+# required extensions that do not affect geometry, or are supported here
 _KNOWN_REQUIRED = (
     "KHR_texture_",
     "KHR_materials_",
@@ -40,10 +40,10 @@ _INSTANCING = "EXT_mesh_gpu_instancing"
 
 
 def read_gltf(source: MeshSource, binary: bool, *, data: bytes | None = None) -> list[trimesh.Trimesh]:
-    """Read the default scene of a glTF 2.0 document into parts in its own frame (metres, Y-up), node transforms baked.
+    """Read the default scene of a glTF 2.0 document into parts in its own frame (metres, Y-up), with node transforms applied.
 
-    ``data`` is the document itself where it is not the file's. A mesh that is bound to a skeleton is taken in the pose that the
-    file holds. Raises InputError: ``unreadable``, ``too_large``.
+    ``data`` is the document if it is not the content of the file. A skinned mesh is read in the pose of the file. Raises
+    InputError: ``unreadable``, ``too_large``.
     """
     with source.reading("glTF"):
         return _scene_parts(source, binary, source.data() if data is None else data)
@@ -70,7 +70,7 @@ def _scene_parts(source: MeshSource, binary: bool, data: bytes) -> list[trimesh.
             source.find("it is bound to a skeleton; it was taken in the pose that the file holds")
             joints = joint_matrices(tree, node["skin"], placed, accessors, source)
             found = reader.posed_parts(node["mesh"], joints, weights)
-            matrix = np.eye(4)  # its own node does not move it
+            matrix = np.eye(4)  # the transform of its own node does not apply
         elif weights:
             found = reader.posed_parts(node["mesh"], None, weights)
         else:
@@ -123,7 +123,7 @@ def _check_document(tree: dict[str, Any], source: MeshSource) -> None:
 
 
 def _placed_nodes(tree: dict[str, Any], source: MeshSource) -> dict[int, np.ndarray]:
-    """Return the transform ``(4, 4)`` to the scene of every node of the default scene, each after those that hold it."""
+    """Return the transform ``(4, 4)`` to the scene of every node of the default scene, parents first."""
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])
     default = tree.get("scene", 0)
@@ -137,10 +137,10 @@ def _placed_nodes(tree: dict[str, Any], source: MeshSource) -> dict[int, np.ndar
     while stack:
         index, parent = stack.pop()
         if not isinstance(index, int) or not 0 <= index < len(nodes) or index in placed:
-            # section 3.5.2: nodes form strict trees; anything else would never end
+            # section 3.5.2: nodes form strict trees; a cycle would never end
             raise source.unreadable("its nodes do not form a tree", "export it again")
         node = nodes[index]
-        with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
+        with np.errstate(all="ignore"):  # overflows are found when vertices are checked
             matrix = parent @ _local_matrix(node, source)
         placed[index] = matrix
         stack.extend((child, matrix) for child in reversed(node.get("children", [])))

@@ -1,4 +1,4 @@
-"""The binary side of glTF 2.0: buffers, views and accessors, every size checked before a byte is used."""
+"""Buffers, buffer views and accessors of glTF 2.0, with every size checked before use."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def split_glb(data: bytes, source: MeshSource) -> tuple[bytes, memoryview | None
         raise source.unreadable(f"truncated: the GLB declares {length} bytes but has {len(data)}", _REMEDY)
     chunks: list[tuple[int, memoryview]] = []
     offset = 12
-    while offset + 8 <= length and len(chunks) < 2:  # all that a reader may look at
+    while offset + 8 <= length and len(chunks) < 2:  # a reader may use only two chunks
         size, kind = struct.unpack_from("<II", data, offset)
         if offset + 8 + size > length:
             raise source.unreadable("a GLB chunk is longer than the file", _REMEDY)
@@ -43,7 +43,7 @@ def split_glb(data: bytes, source: MeshSource) -> tuple[bytes, memoryview | None
 
 
 class Accessors:
-    """Arrays of a glTF document by accessor index; raises InputError ``unreadable`` for whatever does not add up."""
+    """Arrays of a glTF document by accessor index; raises InputError ``unreadable`` for inconsistent data."""
 
     def __init__(self, tree: dict[str, Any], binary: Buffer | None, source: MeshSource):
         self._tree, self._binary, self._source = tree, binary, source
@@ -61,25 +61,25 @@ class Accessors:
         return self._arrays[position]
 
     def has_data(self, index: Any) -> bool:
-        """Tell whether accessor ``index`` has data in a buffer."""
+        """Return whether accessor ``index`` has data in a buffer."""
         accessor = self._tree["accessors"][self._checked(index, "accessors")]
         return "bufferView" in accessor or "sparse" in accessor
 
     def is_filled(self, index: Any) -> bool:
-        """Tell whether accessor ``index`` has its array already."""
+        """Return whether the array of accessor ``index`` has been set."""
         return self._checked(index, "accessors") in self._arrays
 
     def count(self, index: Any) -> int:
-        """Return how many elements accessor ``index`` says that it has."""
+        """Return the element count that accessor ``index`` states."""
         return self._count(self._tree["accessors"][self._checked(index, "accessors")].get("count"))
 
     def fill(self, index: Any, values: np.ndarray) -> None:
-        """Give accessor ``index`` the values ``(count, columns)`` that were compressed; see ``array``."""
+        """Set the values ``(count, columns)`` of accessor ``index`` from decompressed data; see ``array``."""
         position = self._checked(index, "accessors")
         self._arrays[position] = _normalized(values, self._tree["accessors"][position])
 
     def view(self, index: Any) -> memoryview:
-        """Return the bytes of buffer view ``index``, decompressed where meshoptimizer has compressed it."""
+        """Return the bytes of buffer view ``index``, decompressed if meshoptimizer compressed it."""
         position = self._checked(index, "bufferViews")
         view = self._tree["bufferViews"][position]
         if is_compressed(view):
@@ -111,7 +111,7 @@ class Accessors:
             raise self._source.unreadable(f"its {MESHOPT} data is broken ({str(error)[:60]})", _REMEDY) from error
 
     def uri(self, uri: str, what: str) -> bytes | None:
-        """Return the bytes behind a data or file URI, or None with a finding where it leads nowhere safe."""
+        """Return the content of a data or file URI, or None with a finding if it is broken or unsafe."""
         if not uri.startswith("data:"):
             return self._source.sibling(uri, what)
         head, _, body = uri.partition(",")
@@ -148,7 +148,7 @@ class Accessors:
         kind, columns = _DTYPES.get(accessor.get("componentType", 0)), _COLUMNS.get(accessor.get("type", ""))
         if kind is None or columns is None:
             raise self._source.unreadable("an accessor has an unknown type", "export it again as glTF 2.0")
-        # accessors may share a view, or have none: what they ask for is not what the file holds
+        # accessors may share a view, or have none, so that they can request more than the file holds
         self._values += count * columns
         limit = _VALUES_PER_VERTEX * self._source.limits.max_vertices
         if self._values > limit:

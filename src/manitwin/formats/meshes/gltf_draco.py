@@ -1,4 +1,4 @@
-"""Geometry that a glTF document has compressed by Draco (KHR_draco_mesh_compression)."""
+"""Geometry of glTF documents compressed by Draco (KHR_draco_mesh_compression)."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _REMEDY = "export it again, or without compression"
 
 
 def decompress(primitive: dict[str, Any], accessors: Accessors, source: MeshSource) -> bool:
-    """Decode a primitive's Draco data into the accessors that it names; returns whether it has such data.
+    """Decode a primitive's Draco data into the accessors that it names; return whether it has such data.
 
-    Where the accessors have data of their own, as for readers that know no Draco, nothing is decoded. What comes out is a list of
-    triangles, whatever the primitive's mode was. Raises InputError ``unreadable``, ``too_large``.
+    If the accessors have their own data, for readers without Draco, nothing is decoded. The result is a list of triangles,
+    whatever the mode of the primitive. Raises InputError ``unreadable``, ``too_large``.
     """
     extensions = primitive.get("extensions")
     compressed = extensions.get(DRACO) if isinstance(extensions, dict) else None
@@ -52,9 +52,9 @@ def _decoded_elsewhere(data: bytes, source: MeshSource) -> tuple[np.ndarray, dic
 
 
 def decoded(data: bytes) -> tuple[np.ndarray, dict[int, np.ndarray]]:
-    """Return the faces ``(F, 3) uint32`` of a mesh compressed by Draco, and its attributes ``(V, k)`` by their unique ids.
+    """Return the faces ``(F, 3) uint32`` of a mesh compressed by Draco, and its attributes ``(V, k)`` by unique id.
 
-    Raises ValueError for what Google's decoder does not take.
+    Raises ValueError for data that Google's decoder refuses.
     """
     import DracoPy
 

@@ -1,4 +1,4 @@
-"""Materials of glTF 2.0 documents, their textures decoded, and texture coordinates as KHR_texture_transform moves them."""
+"""Materials of glTF 2.0 documents with decoded textures, and texture coordinates after KHR_texture_transform."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class GltfMaterials:
         self._images: dict[int, Image.Image | None] = {}
 
     def material(self, index: Any) -> PBRMaterial:
-        """Return material ``index``; the default material of the specification for None."""
+        """Return material ``index``; the specification's default material for None."""
         known = _indexed(self._tree, "materials", index)
         key = index if known is not None else None
         if key not in self._materials:
@@ -32,7 +32,7 @@ class GltfMaterials:
         return self._materials[key]
 
     def base_texture(self, index: Any) -> dict[str, Any]:
-        """Return the base colour's textureInfo, which names the set of texture coordinates; {} without one."""
+        """Return the textureInfo of the base colour, which names the set of texture coordinates; {} without one."""
         return _base(_indexed(self._tree, "materials", index) or {})[1]
 
     def _build(self, entry: dict[str, Any]) -> PBRMaterial:
@@ -43,7 +43,7 @@ class GltfMaterials:
             factor = list(color_of_lost_texture(factor))
         metallic = float(pbr.get("metallicFactor", 1.0))
         if "metallicFactor" not in pbr and "metallicRoughnessTexture" not in pbr and self._forgets_metallic(entry):
-            # trimesh writes none for materials that came without one (an OBJ's), which the specification reads as metal
+            # trimesh writes none for materials without one (an OBJ's), which the specification interprets as metal
             self._source.find("metallicFactor is missing in a file written by trimesh; taken as 0 (not metal)")
             metallic = 0.0
         return pbr_material(
@@ -97,7 +97,7 @@ class GltfMaterials:
 
 
 def texture_coordinates(info: dict[str, Any]) -> Any:
-    """Return the number of the set of texture coordinates that a textureInfo names; KHR_texture_transform may name another."""
+    """Return the texture coordinate set that a textureInfo names; KHR_texture_transform may override it."""
     change = info.get("extensions", {}).get("KHR_texture_transform") or {}
     return change.get("texCoord", info.get("texCoord", 0))
 

@@ -1,4 +1,4 @@
-"""Buffer views of glTF documents that meshoptimizer has compressed.
+"""Decompression of glTF buffer views compressed by meshoptimizer.
 
 Source: EXT_meshopt_compression (Khronos, ratified), appendix A (bitstream) and B (filters).
 """
@@ -20,9 +20,9 @@ _NO_INDEX = 0xFFFFFFFF
 
 
 def decompressed(data: bytes, *, mode: str, filter: str, count: int, stride: int) -> bytes:
-    """Return the ``count`` elements of ``stride`` bytes that a compressed buffer view holds.
+    """Return the ``count`` elements of ``stride`` bytes in a compressed buffer view.
 
-    Raises ValueError or IndexError for what is not such a stream.
+    Raises ValueError or IndexError for an invalid stream.
     """
     if mode == "ATTRIBUTES":
         if not 0 < stride <= 256 or stride % 4:
@@ -35,7 +35,7 @@ def decompressed(data: bytes, *, mode: str, filter: str, count: int, stride: int
 
 
 def decode_attributes(data: bytes, count: int, stride: int) -> np.ndarray:
-    """Return the elements (count, stride) uint8 of a stream of mode 0: differences to the element before, byte by byte."""
+    """Return the elements (count, stride) uint8 of a stream of mode 0: bytewise differences to the previous element."""
     if not data or data[0] != _ATTRIBUTES:
         raise ValueError("no stream of attributes")
     tail = max(_TAIL_BYTES, stride)
@@ -60,7 +60,7 @@ def decode_attributes(data: bytes, count: int, stride: int) -> np.ndarray:
 
 
 def _decode_groups(data: bytes, at: int, groups: int, end: int) -> tuple[bytes, int]:
-    """Return the deltas of one byte of a block's elements, in zigzag, and where the next byte's begin."""
+    """Return the zigzag deltas of one byte of a block's elements, and the position after them."""
     head = data[at : at + -(-groups // 4)]
     at += len(head)
     row = []
@@ -75,7 +75,7 @@ def _decode_groups(data: bytes, at: int, groups: int, end: int) -> tuple[bytes, 
             packed, table, sentinel = (4, _TWO_BITS, 3) if bits == 1 else (8, _FOUR_BITS, 15)
             deltas = bytearray(b"".join([table[each] for each in data[at : at + packed]]))
             at += packed
-            if deltas.count(sentinel):  # what does not fit the bits follows as whole bytes
+            if deltas.count(sentinel):  # values that do not fit the bits follow as whole bytes
                 for place, delta in enumerate(deltas):
                     if delta == sentinel:
                         deltas[place] = data[at]
@@ -87,7 +87,7 @@ def _decode_groups(data: bytes, at: int, groups: int, end: int) -> tuple[bytes, 
 
 
 def decode_triangles(data: bytes, count: int) -> np.ndarray:
-    """Return the indices (count,) uint32 of a stream of mode 1: triangles told by edges and vertices that were seen lately."""
+    """Return the indices (count,) uint32 of a stream of mode 1: triangles coded by recent edges and vertices."""
     triangles, rest = divmod(count, 3)
     if not data or data[0] != _TRIANGLES or rest or len(data) < 1 + triangles + 16:
         raise ValueError("no stream of triangles")
@@ -95,7 +95,7 @@ def decode_triangles(data: bytes, count: int) -> np.ndarray:
     table = data[-16:]
     edges = [(_NO_INDEX, _NO_INDEX)] * 16
     vertices = [_NO_INDEX] * 16
-    edge, vertex, following = 0, 0, 0  # where the next of each goes; the next index that is new
+    edge, vertex, following = 0, 0, 0  # the next position in each queue, and the next new index
     made: list[int] = []
     for code in data[1 : 1 + triangles]:
         high, low = code >> 4, code & 15
@@ -145,7 +145,7 @@ def decode_triangles(data: bytes, count: int) -> np.ndarray:
 
 
 def decode_indices(data: bytes, count: int) -> np.ndarray:
-    """Return the indices (count,) uint32 of a stream of mode 2: differences to one of two indices before."""
+    """Return the indices (count,) uint32 of a stream of mode 2: differences to one of two previous indices."""
     if not data or data[0] != _INDICES or len(data) < 1 + count + 4:
         raise ValueError("no stream of indices")
     stream = _Indices(data, 1)
@@ -158,7 +158,7 @@ def decode_indices(data: bytes, count: int) -> np.ndarray:
 
 
 class _Indices:
-    """Numbers of a stream that do not fit a code, read one after the other; raises IndexError at its end."""
+    """Reader of numbers outside the codes of a stream; raises IndexError at its end."""
 
     def __init__(self, data: bytes, at: int):
         self._data, self._at, self._last = data, at, 0
@@ -169,7 +169,7 @@ class _Indices:
         return value
 
     def number(self) -> int:
-        """Return the next number in base 128, its low digits first (LEB128)."""
+        """Return the next number in base 128, low digits first (LEB128)."""
         value = shift = 0
         while True:
             byte = self.byte()
@@ -181,23 +181,23 @@ class _Indices:
                 raise ValueError("a number of more than 32 bits")
 
     def index(self) -> int:
-        """Return the next index, which is told by its difference to the last that was told."""
+        """Return the next index, coded as difference to the last one of this reader."""
         self._last = (self._last + _unfolded(self.number())) & _NO_INDEX
         return self._last
 
     def beside(self, is_next: bool) -> int:
-        """Return the index after the last that was told, or before it."""
+        """Return the successor or predecessor of the last index of this reader."""
         self._last = (self._last + (1 if is_next else -1)) & _NO_INDEX
         return self._last
 
 
 def _unfolded(value: int) -> int:
-    """Return the signed number that zigzag folds into an unsigned one."""
+    """Decode a zigzag integer to a signed one."""
     return value >> 1 if value & 1 == 0 else ~(value >> 1)
 
 
 def _filtered(elements: np.ndarray, name: str) -> np.ndarray:
-    """Return elements (count, stride) uint8 as a filter leaves them (appendix B)."""
+    """Apply a filter to elements (count, stride) uint8 (appendix B)."""
     stride = elements.shape[1]
     if name == "NONE":
         return elements
@@ -237,6 +237,6 @@ def _quaternions(packed: np.ndarray) -> np.ndarray:
 
 
 def is_compressed(view: dict[str, Any]) -> bool:
-    """Tell whether a buffer view has meshoptimizer's extension."""
+    """Return whether a buffer view has meshoptimizer's extension."""
     extensions = view.get("extensions")
     return isinstance(extensions, dict) and isinstance(extensions.get(MESHOPT), dict)

@@ -1,4 +1,4 @@
-"""Morph targets of glTF documents, with the weights that the file holds (glTF 2.0, section 3.7.2.2)."""
+"""Morph targets of glTF documents, applied with the weights of the file (glTF 2.0, section 3.7.2.2)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _AXES = 3
 
 
 def target_weights(given: Any, source: MeshSource) -> tuple[float, ...]:
-    """Return the weights of a node or a mesh, empty where it has none; raises InputError ``unreadable``."""
+    """Return the weights of a node or mesh, empty if it has none; raises InputError ``unreadable``."""
     if given is None:
         return ()
     if not isinstance(given, list) or not all(
@@ -32,9 +32,10 @@ def morphed(
     source: MeshSource,
     attribute: str = "POSITION",
 ) -> np.ndarray:
-    """Return rows ``(V, 3)`` of an attribute with what each target adds, times its weight.
+    """Return rows ``(V, 3)`` of an attribute plus the weighted displacements of the targets.
 
-    Targets beyond the weights have none, and what a target does not name it does not change. Raises InputError ``unreadable``.
+    Targets beyond the weights are ignored, and a target without the attribute does not change it. Raises InputError
+    ``unreadable``.
     """
     if not isinstance(targets, list) or not all(isinstance(target, dict) for target in targets):
         raise source.unreadable("its morph targets are not a list of objects", "export it again")
@@ -45,6 +46,6 @@ def morphed(
         added = accessors.array(target[attribute])
         if added.shape != (len(rows), _AXES):
             raise source.unreadable("a morph target does not fit its mesh", "export it again")
-        with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
+        with np.errstate(all="ignore"):  # overflows are found when vertices are checked
             moved += weight * added.astype(np.float64)
     return moved

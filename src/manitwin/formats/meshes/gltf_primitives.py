@@ -1,4 +1,4 @@
-"""The primitives of the meshes of a glTF 2.0 document, built into parts: positions, faces, colours, materials, poses."""
+"""Construction of parts from the primitives of glTF 2.0 meshes: positions, faces, colours, materials, poses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _WHITE = 1 - 1 / 255
 
 
 class GltfPrimitives:
-    """Builds the parts of meshes, given by their indices; those of a mesh are built once for all of its instances."""
+    """Builds the parts of meshes by mesh index; unposed parts are built once for all instances of a mesh."""
 
     def __init__(self, tree: dict[str, Any], accessors: Accessors, materials: GltfMaterials, source: MeshSource):
         self._tree, self._accessors, self._materials, self._source = tree, accessors, materials, source
@@ -41,9 +41,9 @@ class GltfPrimitives:
         return self._parts[index]
 
     def posed_parts(self, index: Any, joints: np.ndarray | None, weights: tuple[float, ...]) -> list[trimesh.Trimesh]:
-        """Return the parts of a mesh in the scene as ``joints`` (J, 4, 4) move it, or in its own frame without.
+        """Return the parts of a mesh, in the scene if posed by ``joints`` (J, 4, 4), otherwise in its own frame.
 
-        ``weights`` are those of its morph targets where the node has any, its own without.
+        ``weights`` are the morph target weights of the node; if empty, those of the mesh are used.
         """
         meshes = self._tree.get("meshes", [])
         if not isinstance(index, int) or not 0 <= index < len(meshes):
@@ -76,7 +76,7 @@ class GltfPrimitives:
         faces = self._faces(primitive, count, mode)
         used: np.ndarray | slice = slice(None)
         if self._vertex_count + count > self._source.limits.max_vertices:
-            # primitives may share one array of vertices, of which each uses a few
+            # primitives may share one vertex array, of which each uses a few
             used, inverse = np.unique(faces, return_inverse=True)
             faces = inverse.reshape(-1, 3)
         vertices = vertices[used]
@@ -88,7 +88,7 @@ class GltfPrimitives:
         material = self._materials.material(primitive.get("material"))
         uv = self._rows(attributes, f"TEXCOORD_{texture_coordinates(info)}", 2, count)
         if uv is not None:
-            with np.errstate(invalid="ignore"):  # signalling NaNs, which make_part takes for 0
+            with np.errstate(invalid="ignore"):  # signalling NaNs, which make_part replaces by 0
                 uv = transformed_uv(uv[used].astype(np.float64), info)
             uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])  # to the origin at the lower left
         normals = self._rows(attributes, "NORMAL", 3, count)
@@ -108,9 +108,9 @@ class GltfPrimitives:
         return color_by_corner(part, _srgb_colors(colors[used])[part.faces], self._source)
 
     def _tinted(self, part: trimesh.Trimesh, colors: np.ndarray) -> trimesh.Trimesh:
-        """Return a textured part under vertex colours ``(V, 3)``, linear, which multiply its texture (section 3.9.2).
+        """Return a textured part tinted by linear vertex colours ``(V, 3)``, which multiply its texture (section 3.9.2).
 
-        One colour for all of it tints its material; others would need a texture of their own.
+        A uniform colour tints the material; varying colours would need a texture of their own and are left out.
         """
         if not len(colors) or (colors > _WHITE).all():
             return part
@@ -160,12 +160,12 @@ class GltfPrimitives:
 
 
 def _linear_colors(colors: np.ndarray) -> np.ndarray:
-    """Return the colours ``(V, 3)`` in 0..1 that COLOR_0 says: linear, where textures are sRGB (section 3.7.2.1)."""
-    if colors.dtype.kind in "iu":  # integers that do not say normalized are meant so all the same
+    """Return the colours ``(V, 3)`` in 0..1 of COLOR_0, which are linear, unlike textures in sRGB (section 3.7.2.1)."""
+    if colors.dtype.kind in "iu":  # integers without the normalized flag are meant as normalized too
         colors = colors / np.iinfo(colors.dtype).max
     return np.clip(np.nan_to_num(colors.astype(np.float64)), 0, 1)
 
 
 def _srgb_colors(colors: np.ndarray) -> np.ndarray:
-    """Return the colours ``(V, 3) uint8`` sRGB that COLOR_0 says."""
+    """Return the colours ``(V, 3) uint8`` of COLOR_0 in sRGB."""
     return np.round(linear_to_srgb(_linear_colors(colors)) * 255).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""Meshes of glTF documents that are bound to a skeleton, in the pose that the file holds (glTF 2.0, section 3.7.3)."""
+"""Skinned meshes of glTF documents, in the pose of the file (glTF 2.0, section 3.7.3)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LEAST_WEIGHT = 1e-6
 def joint_matrices(
     tree: Mapping[str, Any], skin: Any, placed: Mapping[int, np.ndarray], accessors: Accessors, source: MeshSource
 ) -> np.ndarray:
-    """Return the transform (J, 4, 4) from the bound mesh to the scene that each joint of a skin gives.
+    """Return the transforms (J, 4, 4) of a skin's joints, from the bind pose of the mesh to the scene.
 
     ``placed`` are the transforms of the scene's nodes. Raises InputError ``unreadable``.
     """
@@ -33,14 +33,14 @@ def joint_matrices(
     rows = accessors.array(inverse_bind)
     if rows.shape[1] != 16 or len(rows) < len(joints):
         raise source.unreadable("its skeleton has fewer bind matrices than joints", "export it again")
-    with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
+    with np.errstate(all="ignore"):  # overflows are found when vertices are checked
         return world @ rows[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1).astype(np.float64)
 
 
 def influences(
     attributes: Mapping[str, Any], accessors: Accessors, count: int, source: MeshSource
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the joints (V, K) that move each of ``count`` vertices, and their shares (V, K), which sum to 1.
+    """Return the joints (V, K) that influence each of ``count`` vertices, and their weights (V, K), which sum to 1.
 
     Raises InputError ``unreadable``.
     """
@@ -70,11 +70,10 @@ def posed(
     matrices: np.ndarray,
     source: MeshSource,
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return vertices (V, 3) and normals (V, 3) moved by the joints that they are ``bound_to`` (``influences``).
+    """Return vertices (V, 3) and normals (V, 3) posed by linear blend skinning.
 
-    The transforms of a vertex's joints are blended by their shares (linear blend skinning).
-
-    Raises InputError ``unreadable`` where a joint is not there.
+    ``bound_to`` are the joints and weights of ``influences``; the transforms of a vertex's joints are blended by its weights.
+    Raises InputError ``unreadable`` for a joint that does not exist.
     """
     joints, shares = bound_to
     if len(joints) and int(joints.max()) >= len(matrices):
@@ -91,6 +90,6 @@ def posed(
 
 
 def _cofactors(matrices: np.ndarray) -> np.ndarray:
-    """Return the cofactor matrices (V, 3, 3), which turn normals as their inverse transposes do, and exist where these do not."""
+    """Return the cofactor matrices (V, 3, 3), which transform normals like inverse transposes and exist for singular matrices."""
     rows = matrices[:, [1, 2, 0]], matrices[:, [2, 0, 1]]
     return np.cross(*rows)

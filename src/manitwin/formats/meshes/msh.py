@@ -1,4 +1,4 @@
-"""MuJoCo's binary meshes (.msh): counts, positions, normals, texture coordinates and triangles, without a magic number."""
+"""Reader of MuJoCo's binary meshes (.msh): counts, positions, normals, texture coordinates and triangles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _REMEDY = "download it again, or export it as OBJ"
 
 
 def read_msh(source: MeshSource) -> list[trimesh.Trimesh]:
-    """Read a mesh of MuJoCo's own binary format into one grey part; raises InputError ``unreadable``, ``too_large``."""
+    """Read a mesh of MuJoCo's binary format into one grey part; raises InputError ``unreadable``, ``too_large``."""
     data = source.data()
     if msh_bytes(data[:MSH_HEADER_BYTES]) != len(data):
         raise source.unreadable(f"its counts do not fit its {len(data)} bytes", _REMEDY)
@@ -46,5 +46,5 @@ def read_msh(source: MeshSource) -> list[trimesh.Trimesh]:
 
 
 def _from_upper_left(uv: np.ndarray) -> np.ndarray:
-    """Turn texture coordinates with the origin at the upper left, as MuJoCo has them, into ones with it at the lower left."""
+    """Convert texture coordinates with the origin at the upper left, as in MuJoCo, to the origin at the lower left."""
     return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])

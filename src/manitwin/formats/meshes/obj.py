@@ -1,4 +1,4 @@
-"""Wavefront OBJ meshes with their material libraries."""
+"""Reader of Wavefront OBJ meshes with their material libraries."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from manitwin.formats.meshes.textures import (
 from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.source_files import map_file_name
 
-_MAX_PLAIN_BYTES = 64 << 20  # of a text that is held as lines; longer ones are read line by line
+_MAX_PLAIN_BYTES = 64 << 20  # limit for a text that is split into lines at once; longer ones are read line by line
 _MAX_LINE = 64 << 20  # a face may have millions of corners
-_MAX_NUMBERS = 4096  # characters of a line of numbers
+_MAX_NUMBERS = 4096  # characters in a line of numbers
 _MAX_LIBRARIES, _NAME_CHARACTERS = 1000, 4096
 
 
@@ -43,9 +43,9 @@ class _Document:
 
 
 def read_obj(source: MeshSource) -> list[trimesh.Trimesh]:
-    """Read an OBJ into one part a material; polygons of any size are cut into fans of triangles.
+    """Read an OBJ into one part for each material; polygons of any size are cut into triangle fans.
 
-    Raises InputError ``unreadable`` naming the line where the text is broken.
+    Raises InputError ``unreadable`` naming the line at which the text is broken.
     """
     data = source.data()
     if len(data) <= _MAX_PLAIN_BYTES:
@@ -62,7 +62,7 @@ def read_obj(source: MeshSource) -> list[trimesh.Trimesh]:
     parts = []
     for name, group in document.groups.items():
         sizes, rows = group.rows()
-        if not len(rows):  # of its faces none has a corner
+        if not len(rows):  # none of its faces has a corner
             continue
         faces, corners = _unique_corners(sizes, rows, (len(positions), len(uv), len(normals)), source)
         part = make_part(
@@ -86,9 +86,9 @@ def read_obj(source: MeshSource) -> list[trimesh.Trimesh]:
 
 
 def _lines(data: bytes, source: MeshSource) -> Iterator[str]:
-    """Yield the lines of a text one by one, those that end with a backslash joined with the next."""
+    """Yield the lines of a text, joining those that end with a backslash with the next."""
     stream = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8", errors="replace")
-    if len(data) < _MAX_LINE and b"\\" not in data:  # no line can be too long, and none is joined with the next
+    if len(data) < _MAX_LINE and b"\\" not in data:  # no line can be too long, and none is continued
         yield from stream
         return
     joined: list[str] = []
@@ -131,7 +131,8 @@ def _parse(data: bytes, source: MeshSource) -> _Document:
             if group is None:
                 group = document.groups.setdefault(material, Faces(source))
                 source.check_parts(len(document.groups))
-            size = len(rest.split(None, most + 3))  # one word more than may be: the rest of the line
+            # at most one word more than allowed; the rest of the line stays unsplit
+            size = len(rest.split(None, most + 3))
             triangles += max(size - 2, 1)
             if triangles > most:
                 source.check_faces(triangles)
@@ -150,14 +151,14 @@ def _unique_corners(
     """Return triangles ``(F, 3)`` of polygons with these corner counts and rows, into unique ``(v, vt, vn)`` rows ``(V, 3)``."""
     for column, (count, what) in enumerate(zip(counts, ("vertex", "texture coordinate", "normal"), strict=True)):
         if column and not count and rows[:, column].max() >= 0:
-            rows[:, column] = -1  # loaders do not miss what they can do without
+            rows[:, column] = -1  # optional indices are ignored, as in other loaders
             source.find(f"its faces name {what}s, of which it has none")
         if rows[:, column].max() >= count:
             raise source.unreadable(
                 f"a face names {what} {rows[:, column].max() + 1} of {count}",
                 "the file is truncated or broken; export it again",
             )
-    # one integer a corner sorts much faster than rows
+    # sorting one integer for each corner is much faster than sorting rows
     key = rows[:, 0] * (counts[1] + 1) + rows[:, 1] + 1
     if (counts[0] + 1) * (counts[1] + 1) * (counts[2] + 1) >= 2**63:
         key = np.unique(key, return_inverse=True)[1]
@@ -175,16 +176,16 @@ def _table(lines: list[str], columns: int, keyword: str, source: MeshSource) -> 
 
 
 def _numbers(lines: list[str], columns: Sequence[int]) -> np.ndarray:
-    """Return these columns of lines of numbers, ``(lines, columns)``; raises ValueError where one is short or no number."""
+    """Return these columns of lines of numbers, ``(lines, columns)``; raises ValueError if a line is short or not numeric."""
     if not lines:
         return np.empty((0, len(columns)))
     if not all(lines):
-        raise ValueError("an empty line")  # which loadtxt would pass over
+        raise ValueError("an empty line")  # which loadtxt would skip
     return np.loadtxt(lines, comments=None, usecols=columns, ndmin=2)
 
 
 def _vertex_colors(lines: list[str]) -> np.ndarray | None:
-    """Return the ``(V, 3) uint8`` sRGB colours that some programs write behind positions, or None."""
+    """Return the ``(V, 3) uint8`` sRGB colours that some programs write after positions, or None."""
     if not lines:
         return None
     try:
@@ -209,9 +210,9 @@ def _materials(document: _Document, source: MeshSource) -> dict[str, PBRMaterial
 
 
 def plain_triangles(text: str) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return vertices ``(V, 3)`` and triangles ``(F, 3)`` of such a text, None for any other or a broken one.
+    """Return vertices ``(V, 3)`` and triangles ``(F, 3)`` of a text with only ``v`` and ``f`` lines, None for any other.
 
-    All vertices are used by some triangle: the full reader leaves out others.
+    Every vertex is used by a triangle, since the full reader drops unused ones.
     """
     if "/" in text or "\\" in text:
         return None
@@ -220,7 +221,7 @@ def plain_triangles(text: str) -> tuple[np.ndarray, np.ndarray] | None:
     corners = [line[2:] for line in lines if line.startswith("f ")]
     if not corners or len(places) + len(corners) != len(lines):
         return None
-    # three of each in every line, and no line longer than three numbers are
+    # three values in every line, and no line longer than three numbers
     if any(len(line) > _MAX_NUMBERS or len(line.split()) != 3 for line in (*places, *corners)):
         return None
     try:
@@ -238,8 +239,8 @@ def plain_triangles(text: str) -> tuple[np.ndarray, np.ndarray] | None:
 def read_mtl(text: str, source: MeshSource) -> dict[str, PBRMaterial]:
     """Return the materials of an MTL file by name.
 
-    Kd (unless there is a map_Kd), d, Ns, Pr, Pm, map_Kd and norm are used. ``Tr`` is not: MeshLab
-    writes 1 there for opaque.
+    Kd (unless there is a map_Kd), d, Ns, Pr, Pm, map_Kd and norm are used. ``Tr`` is ignored, because MeshLab writes 1 for
+    opaque.
     """
     materials: dict[str, PBRMaterial] = {}
     entries: list[tuple[str, dict[str, str]]] = []
@@ -258,7 +259,7 @@ def read_mtl(text: str, source: MeshSource) -> dict[str, PBRMaterial]:
 def _material(name: str, values: dict[str, str], source: MeshSource) -> PBRMaterial:
     texture = _map(values.get("map_kd"), source)
     color = _leading_numbers(values.get("kd")) or DEFAULT_COLOR
-    # exporters leave Kd black or grey beside a map and viewers ignore it there
+    # exporters leave Kd black or grey beside a map, and viewers ignore it
     base = (1.0, 1.0, 1.0) if texture is not None else (*color, *color, *color)[:3]
     if texture is None and "map_kd" in values:
         base = color_of_lost_texture(base)

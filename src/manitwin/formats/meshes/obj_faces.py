@@ -1,4 +1,4 @@
-"""The faces of an OBJ text, lines of corners ``v/vt/vn``: read all at once where they are plain, one by one elsewhere."""
+"""Faces of an OBJ text, lines of corners ``v/vt/vn``: parsed all at once if regular, otherwise one by one."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ _PLAIN = re.compile(r"[0-9/ ]+")
 
 @dataclass
 class Faces:
-    """The faces of one material: per polygon its corner count, per corner its 0-based v, vt and vn index (-1: none)."""
+    """The faces of one material: the corner count of each polygon, and 0-based v, vt and vn indices of each corner (-1: none)."""
 
     source: MeshSource
-    _waiting: list[tuple[int, str, str]] = field(default_factory=list)  # number and text of a line, and its corners
+    _waiting: list[tuple[int, str, str]] = field(default_factory=list)  # line number, line, and its corners
     _waiting_sizes: list[int] = field(default_factory=list)
-    _sizes: list[int] = field(default_factory=list)  # of what was read one by one last
+    _sizes: list[int] = field(default_factory=list)  # of the faces parsed one by one last
     _corners: list[tuple[int, int, int]] = field(default_factory=list)
-    _blocks: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)  # sizes and corners before these
+    _blocks: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)  # sizes and corners of earlier faces
     _known: dict[str, tuple[int, int, int]] = field(default_factory=dict)
 
     def add(self, number: int, line: str, said: str, size: int, counts: tuple[int, int, int]) -> None:
-        """Add the ``size`` corners that are ``said`` in a line; ``counts`` are of the v, vt and vn before it.
+        """Add the ``size`` corners in the text ``said`` of a line; ``counts`` are the numbers of v, vt and vn before it.
 
-        Raises InputError ``unreadable`` naming the line where it is no face; also ``rows`` may, of a line that was added.
+        Raises InputError ``unreadable`` naming a line that is not a face; ``rows`` may raise it too, for a line added earlier.
         """
-        if "-" in said:  # counts back from here
+        if "-" in said:  # relative to the current counts
             self._read_waiting()
             self._read_one(number, line, said, counts)
         else:
@@ -39,7 +39,7 @@ class Faces:
             self._waiting_sizes.append(size)
 
     def rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the polygons' corner counts ``(P,)`` and the corners ``(sum, 3)``; both empty where no face has three."""
+        """Return the corner counts ``(P,)`` of polygons and the corners ``(sum, 3)``; both empty if no face has three corners."""
         self._read_waiting()
         self._end_block()
         if not self._blocks:
@@ -57,7 +57,7 @@ class Faces:
             self._blocks.append((sizes, corners))
         else:
             for number, line, said in self._waiting:
-                self._read_one(number, line, said, (0, 0, 0))  # none counts back
+                self._read_one(number, line, said, (0, 0, 0))  # none of them is relative
         self._waiting, self._waiting_sizes = [], []
 
     def _end_block(self) -> None:
@@ -76,7 +76,7 @@ class Faces:
             self._corners.extend(corners)
 
     def _corner(self, word: str, counts: tuple[int, int, int]) -> tuple[int, int, int]:
-        """Return the 0-based indices of ``v/vt/vn``; negative numbers count back from the last line so far."""
+        """Return the 0-based indices of ``v/vt/vn``; negative numbers are relative to the current counts."""
         fields = word.split("/")
         indices = [NO_INDEX, NO_INDEX, NO_INDEX]
         relative = False
@@ -95,7 +95,7 @@ class Faces:
 
 
 def plain_corners(text: str) -> np.ndarray | None:
-    """Return the 0-based indices ``(N, 3)`` of corners that are all ``v``, ``v/vt``, ``v//vn`` or ``v/vt/vn``; None of others."""
+    """Return the 0-based indices ``(N, 3)`` of corners all written as ``v``, ``v/vt``, ``v//vn`` or ``v/vt/vn``; else None."""
     if not _PLAIN.fullmatch(text):
         return None
     words = text.split()
@@ -104,7 +104,8 @@ def plain_corners(text: str) -> np.ndarray | None:
     if len(slashes) != 1 or max(slashes) > 2 or (without_uv and slashes != {2}):
         return None
     columns = [0, 2] if without_uv else list(range(max(slashes) + 1))
-    values = np.fromstring(text.replace("/", " "), dtype=np.int64, sep=" ")  # what is too large becomes the largest
+    # numbers that are too large become the largest
+    values = np.fromstring(text.replace("/", " "), dtype=np.int64, sep=" ")
     if len(values) != len(columns) * len(words) or values.min() < 1 or values.max() > MOST_INDEX:
         return None
     corners = np.full((len(words), 3), NO_INDEX, np.int64)

@@ -1,4 +1,4 @@
-"""OFF meshes (Geomview's object file format), as text: ``OFF``, and with colours, normals or texture coordinates of vertices."""
+"""Reader of OFF meshes (Geomview's object file format) in text form, with colours, normals or texture coordinates."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.sniff import OFF_KEYWORD
 
 _REMEDY = "export it again, or as OBJ"
-_COLORS = (0, 1, 3, 4)  # numbers behind a face's corners: none, an index into a map of colours, RGB, RGBA
+_COLORS = (0, 1, 3, 4)  # numbers after a face's corners: none, an index into a colour map, RGB, RGBA
 
 
 def read_off(source: MeshSource) -> list[trimesh.Trimesh]:
-    """Read an OFF text into one part; polygons are cut into fans of triangles, colours are those of vertices or faces.
+    """Read an OFF text into one part; polygons are cut into triangle fans, colours are those of vertices or faces.
 
     Raises InputError: ``unreadable``, ``too_large``, ``no_faces``. Source: Geomview's manual, "OFF: Object File Format". The
-    counts may stand behind the keyword, as in ModelNet40 (Wu et al. 2015), also without a space between.
+    counts may follow the keyword in its line, even without a space, as in ModelNet40 (Wu et al. 2015).
     """
     text = source.data().decode("utf-8", errors="replace").lstrip("\ufeff \t\r\n")
     header = OFF_KEYWORD.match(text)
@@ -51,7 +51,7 @@ def read_off(source: MeshSource) -> list[trimesh.Trimesh]:
 
 
 def _counts(lines: list[list[str]], source: MeshSource) -> tuple[int, int]:
-    """Return how many vertices and faces there are, of which all must be in the text."""
+    """Return the numbers of vertices and faces, after checking that the text has as many lines."""
     said = lines[0] if lines else []
     if len(said) < 2 or not all(word.isascii() and word.isdigit() and len(word) < 18 for word in said[:2]):
         raise source.unreadable("its counts of vertices and faces are missing", _REMEDY)
@@ -76,7 +76,7 @@ def _numbers(lines: list[list[str]], source: MeshSource) -> np.ndarray:
 def _polygons(
     lines: list[list[str]], vertices: int, source: MeshSource
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Return the corner counts ``(P,)``, the corners one after another, and colours ``(P, 3)`` where each face has one."""
+    """Return the corner counts ``(P,)``, the concatenated corners, and colours ``(P, 3)`` if every face has one."""
     sizes = np.array([int(words[0]) for words in lines], np.int64)
     if sizes.min() < 1 or any(len(words) - 1 < size for words, size in zip(lines, sizes.tolist(), strict=True)):
         raise source.unreadable("a face has fewer corners than it declares", _REMEDY)
@@ -97,6 +97,6 @@ def _polygons(
 
 
 def _rgb(colors: np.ndarray) -> np.ndarray:
-    """Return colours ``(N, 3) uint8``, which are shares of one, or bytes where any is above one."""
+    """Return colours ``(N, 3) uint8`` from values in 0..1, or from bytes if any value is above one."""
     known = np.nan_to_num(colors)
     return np.rint(np.clip(known if known.max() > 1 else 255 * known, 0, 255)).astype(np.uint8)

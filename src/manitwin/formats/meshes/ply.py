@@ -1,4 +1,4 @@
-"""PLY meshes (Turk 1994), ASCII and binary, with vertex or face colours or a texture."""
+"""Reader of PLY meshes (Turk 1994), ASCII and binary, with vertex or face colours or a texture."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ _TYPES = {
 
 
 def read_ply(source: MeshSource) -> list[trimesh.Trimesh]:
-    """Read a PLY into one part; polygons of any size are cut into fans of triangles.
+    """Read a PLY into one part; polygons of any size are cut into triangle fans.
 
-    Raises InputError: ``unreadable`` where the file is cut short or broken, ``no_faces`` for a point cloud.
+    Raises InputError: ``unreadable`` for a truncated or broken file, ``no_faces`` for a point cloud.
     """
     data = source.data()
     encoding, elements, texture, offset = _header(data, source)
@@ -120,7 +120,7 @@ def _part(tables: dict[str, Columns], texture: str | None, source: MeshSource) -
     source.check_faces(int(np.maximum(polygons.sizes - 2, 0).sum()))
     corners, owner = triangle_fans(polygons.sizes)
     named = polygons.values[corners]
-    if not ((named >= 0) & (named < len(positions))).all():  # false for NaN
+    if not ((named >= 0) & (named < len(positions))).all():  # also false for NaN
         raise source.unreadable("a face refers to a vertex that does not exist", REMEDY)
     faces = named.astype(np.int64)
     image = _texture(texture, source)
@@ -174,7 +174,7 @@ def _colors(columns: Columns) -> np.ndarray | None:
     if colors is None:
         return None
     red = columns["red"]
-    # floats are 0..1 by custom, integers 0..255; ASCII rows arrive as floats either way
+    # floats are 0..1 by convention, integers 0..255; ASCII rows are parsed as floats in both cases
     scale = (
         255.0 if isinstance(red, np.ndarray) and red.dtype.kind == "f" and len(colors) and colors.max() <= 1.0 else 1.0
     )

@@ -1,4 +1,4 @@
-"""Rows of PLY elements, ASCII and binary. Counts in the header are checked against the file's size before memory is allocated."""
+"""Rows of PLY elements, ASCII and binary, with header counts checked against the file size before allocation."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Property:
 
 @dataclass(frozen=True)
 class Element:
-    """An element of the header, with the number of its rows and their properties in order."""
+    """An element of the header, with its number of rows and its properties in order."""
 
     name: str
     count: int
@@ -36,7 +36,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Lists:
-    """A list property of all rows: ``sizes (N,)`` and their ``values`` one after another."""
+    """A list property of all rows: ``sizes (N,)`` and the concatenated ``values``."""
 
     sizes: np.ndarray
     values: np.ndarray
@@ -46,9 +46,9 @@ Columns = dict[str, np.ndarray | Lists]
 
 
 def check_rows(element: Element, body_bytes: int, source: MeshSource) -> None:
-    """Refuse an element of more rows or values than the file holds or the limits allow; raises InputError.
+    """Refuse an element with more rows or values than the file holds or the limits allow; raises InputError.
 
-    Each row takes at least a byte. Rows without properties take none, so they are never iterated.
+    Each row takes at least a byte. Rows without properties take none, and are never iterated.
     """
     if not element.properties:
         return
@@ -64,16 +64,16 @@ def check_rows(element: Element, body_bytes: int, source: MeshSource) -> None:
 
 
 class Words:
-    """Reads the numbers of an ASCII body in order; of its text no more is parsed at once than a block and what is asked for."""
+    """Reads the numbers of an ASCII body in order, parsing at most a block beyond the requested numbers."""
 
     def __init__(self, data: bytes, offset: int):
         self._data, self._at = data, offset
         self._ahead = np.empty(0)
 
     def peek(self, count: int) -> np.ndarray:
-        """Return the next numbers ``(count,) float64`` without consuming them; raises ValueError where there are fewer."""
+        """Return the next numbers ``(count,) float64`` without consuming them; raises ValueError if there are fewer."""
         if count > len(self._ahead):
-            # a number takes at least one byte, and a byte divides it from the next
+            # a number takes at least one byte, and a byte separates it from the next
             if 2 * (count - len(self._ahead)) - 1 > len(self._data) - self._at:
                 raise ValueError(count)
             blocks, have = [self._ahead], len(self._ahead)
@@ -95,7 +95,7 @@ class Words:
         end = self._at + _BLOCK_BYTES
         if end < len(self._data):
             tail = self._data[end : end + _LONGEST_WORD].split(None, 1)
-            # the rest of a word that the end of the block cut in two
+            # the rest of a word that the end of the block splits
             cut = not (self._data[end - 1 : end].isspace() or self._data[end : end + 1].isspace())
             if cut and tail:
                 end += len(tail[0])
@@ -144,7 +144,7 @@ def _ascii_lists(element: Element, words: Words, source: MeshSource) -> Columns:
 
 
 def _equal_lists(element: Element, words: Words, rows: int) -> dict[str, Lists] | None:
-    """Read rows whose lists are all as long as the first row's, as in most files; return None where they are not."""
+    """Read rows whose lists all have the lengths of the first row, as in most files; return None if they do not."""
     at, places, sizes = 0, [], []
     for p in element.properties:
         size = 1 if p.count_dtype is None else _size(words.peek(at + 1)[at])
@@ -185,10 +185,10 @@ def _size(number: float) -> int:
 
 
 def binary_rows(element: Element, data: bytes, offset: int, order: str, source: MeshSource) -> tuple[Columns, int]:
-    """Read an element's rows from a binary body; returns them and the offset behind them.
+    """Read an element's rows from a binary body; return them and the offset after them.
 
-    Rows whose lists are all as long as the first row's are read at once, others one by one. ``order`` is numpy's sign for the
-    byte order, ``<`` or ``>``. Raises InputError ``unreadable`` where the file ends early.
+    Rows whose lists all have the lengths of the first row are read at once, others one by one. ``order`` is numpy's sign of the
+    byte order, ``<`` or ``>``. Raises InputError ``unreadable`` if the file ends early.
     """
     fields: list[tuple[str, str] | tuple[str, str, tuple[int, ...]]] = []
     at = offset
@@ -247,7 +247,7 @@ def _binary_lists(element: Element, data: bytes, offset: int, order: str, short:
                 raise short from error
             sizes[p.name].append(size)
             at += size * np.dtype(p.dtype).itemsize
-        if row % _BLOCK_ROWS == _BLOCK_ROWS - 1:  # many small arrays take many times their rows' bytes
+        if row % _BLOCK_ROWS == _BLOCK_ROWS - 1:  # many small arrays take many times the bytes of their rows
             _join(joined, fresh)
     _join(joined, fresh)
     columns: Columns = {}

@@ -1,4 +1,4 @@
-"""The convex hull of a mesh file that holds points alone, for formats and engines in which that is what they mean."""
+"""Convex hull of a mesh file with only points, for formats and engines that interpret it so."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import make_part, pbr_material
 
 _FLAT = 1e-9
-"""Least over largest extent up to which points count as lying in one plane."""
+"""Ratio of the smallest to the largest singular value up to which points count as coplanar."""
 
 
 def hull_part(points: np.ndarray, source: MeshSource, color: tuple[float, float, float]) -> trimesh.Trimesh:
-    """Return the hull of points ``(N, 3)`` as a part in one colour, with a finding that says so.
+    """Return the convex hull of points ``(N, 3)`` as a part in one colour, with a finding.
 
-    Raises InputError ``no_faces`` where they span no volume. Source: the XML reference of MuJoCo, ``mesh``.
+    Raises InputError ``no_faces`` if they span no volume. Source: MuJoCo's XML reference, ``mesh``.
     """
     points = np.asarray(points, float)
     flat = source.refused(

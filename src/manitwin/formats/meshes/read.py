@@ -1,4 +1,4 @@
-"""Read a mesh file of any format into textured parts in metres' worth of facts: unit, up axis, findings."""
+"""Reading of mesh files of any supported format into textured parts, with unit, up axis and findings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _SUFFIXES = {
     "off": (".off",),
 }
 _MAX_COORDINATE = 1e12
-"""In the file's unit: a survey's millimetres stay below, and areas and volumes of such numbers are finite in single precision."""
+"""In the file's unit: larger than a survey in millimetres, and areas and volumes stay finite in single precision."""
 _MIN_UNIT_M, _MAX_UNIT_M = 1e-9, 1e6
 
 
@@ -46,10 +46,9 @@ _MIN_UNIT_M, _MAX_UNIT_M = 1e-9, 1e6
 class MeshFile:
     """The content of a mesh file.
 
-    ``parts`` are trimesh meshes with TextureVisuals and PBRMaterial, in the file's own unit and axes, scene transforms
-    baked. ``unit_m`` is the length of that unit in metres and ``up`` the file's up axis ('x' | 'y' | 'z'), None where
-    the format does not say. ``findings`` are plain sentences about what was left out or assumed, ``files`` the other files
-    that were read for it.
+    ``parts`` are trimesh meshes with TextureVisuals and PBRMaterial, in the file's own unit and axes, with scene transforms
+    applied. ``unit_m`` is the length of the unit in metres and ``up`` the up axis ('x' | 'y' | 'z'), each None if the format
+    does not define it. ``findings`` are sentences about what was left out or assumed, ``files`` the other files that were read.
     """
 
     parts: list[trimesh.Trimesh]
@@ -68,10 +67,10 @@ def read_mesh(
     texture_folders: tuple[Path, ...] = (),
     hull_of_points: bool = False,
 ) -> MeshFile:
-    """Read a mesh file, by content and not by name; files that it names are only read from its own folder, or ``root``.
+    """Read a mesh file, detecting the format by content; files that it names are read only from its own folder, or ``root``.
 
-    ``texture_folders``: where pictures are looked up by their name alone, if they are not where the mesh says.
-    ``hull_of_points``: an OBJ or MSH file of points alone is their convex hull, as MuJoCo has it.
+    ``texture_folders``: folders in which missing pictures are looked up by file name. ``hull_of_points``: an OBJ or MSH file
+    with only points is read as their convex hull, as in MuJoCo.
 
     Raises InputError: ``unreadable``, ``too_large``, ``empty``, ``wrong_type``, ``animated``, ``no_faces``, ``not_finite``.
     """
@@ -127,7 +126,7 @@ def _checked(parts: list[trimesh.Trimesh], source: MeshSource) -> list[trimesh.T
     parts = [part for part in parts if len(part.faces)]
     if not parts:
         raise source.refused("no_faces", "it has no faces", "export the surface, not points or lines")
-    if all(len(part.vertices) and np.abs(part.vertices).max() <= _MAX_COORDINATE for part in parts):  # NaN is not less
+    if all(len(part.vertices) and np.abs(part.vertices).max() <= _MAX_COORDINATE for part in parts):  # false for NaN
         return _shaded(parts, source)
     total = sum(len(part.vertices) for part in parts)
     used = [part.vertices[np.unique(part.faces)] for part in parts]

@@ -1,4 +1,4 @@
-"""The visual parts after repair: what survived, wound as the solid is, and patches coloured like what is around."""
+"""Visual parts after mesh repair: surviving faces with the winding of the solid, and patches coloured like their surroundings."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from manitwin.geometry.repair.cascade import RepairResult
 def repaired_parts(parts: list[trimesh.Trimesh], result: RepairResult) -> list[trimesh.Trimesh]:
     """Return parts that show exactly the surface of the repaired solid.
 
-    ``result`` is the repair of all parts' faces in order. Faces that it dropped vanish, flipped ones turn over with
-    their normals, new ones become a part of their own, coloured at every corner like the nearest point of the parts.
+    ``result`` is the repair of the faces of all parts in order. Faces that it dropped are removed, flipped ones are reversed
+    with their normals, and new ones form a separate part, coloured at every corner like the nearest point of the parts.
     """
     counts = np.array([len(part.faces) for part in parts])
     starts = np.cumsum(counts) - counts
@@ -44,7 +44,7 @@ def _surviving(part: trimesh.Trimesh, kept: np.ndarray, flipped: np.ndarray) -> 
         return part
     faces = np.where(flipped[:, None], part.faces[:, ::-1], part.faces)[kept]
     turned = np.repeat(flipped[kept], 3)
-    # a vertex that both turned and unturned faces use is needed twice: its normals point both ways
+    # a vertex used by both flipped and unflipped faces is duplicated: its normals point both ways
     keys = faces.reshape(-1) * 2 + turned
     used, inverse = np.unique(keys, return_inverse=True)
     old = used // 2
@@ -65,7 +65,7 @@ def _patch(parts: list[trimesh.Trimesh], result: RepairResult) -> trimesh.Trimes
     faces = result.mesh.faces[result.source_face < 0]
     used, inverse = np.unique(faces, return_inverse=True)
     vertices = np.asarray(result.mesh.vertices)[used]
-    # parts may hold vertices that no face uses: they have no colour to give
+    # unreferenced vertices have no colour
     referenced = [np.unique(part.faces) for part in parts]
     points = np.concatenate([part.vertices[rows] for part, rows in zip(parts, referenced, strict=True)])
     colors = np.concatenate([_vertex_colors(part)[rows] for part, rows in zip(parts, referenced, strict=True)])
@@ -81,7 +81,7 @@ def _patch(parts: list[trimesh.Trimesh], result: RepairResult) -> trimesh.Trimes
 
 
 def _vertex_colors(part: trimesh.Trimesh) -> np.ndarray:
-    """Return the base colour ``(V, 3) uint8`` sRGB at every vertex, its texture sampled at the nearest texel."""
+    """Return the base colour ``(V, 3) uint8`` sRGB at every vertex, with the texture sampled at the nearest texel."""
     material, uv = material_of(part), uv_of(part)
     factor = np.asarray(material.baseColorFactor[:3]) / 255
     if material.baseColorTexture is None or uv is None:

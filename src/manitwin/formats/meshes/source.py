@@ -1,4 +1,4 @@
-"""The file that a mesh is read from: its limits, the files beside it that it may name, and what is worth telling."""
+"""Access of mesh readers to their file: limits, side files, and findings."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _MESSAGE_CHARACTERS = 400
 _MAX_FINDINGS = 100
 _TEXTURES = 8
 MAX_PARTS = 20_000
-"""Parts of one file, each with a material and a place of its own: more are no single object."""
+"""Limit of parts in one file, each with its own material and position; a single object has fewer."""
 # broken files fail in more ways than a reader can name; none of them is a fault of this program
 _BROKEN = (
     ValueError,
@@ -41,10 +41,10 @@ _BROKEN = (
 
 @dataclass(frozen=True)
 class MeshLimits:
-    """The limits beyond which a mesh file is refused: bytes (with all files it names), triangles, texture pixels.
+    """The limits beyond which a mesh file is refused: bytes (including all named files), triangles, texture pixels.
 
-    ``decode_textures`` false: of textures only the size is looked at, and their pixels are decoded by whoever wants them.
-    ``shading`` false: no normals are made for parts without.
+    ``decode_textures`` false: only the sizes of textures are read, and pixels are decoded on demand. ``shading`` false: no
+    normals are computed for parts without normals.
     """
 
     max_bytes: int = 1 << 30
@@ -55,25 +55,25 @@ class MeshLimits:
 
     @property
     def max_vertices(self) -> int:
-        """The most vertices that so many triangles can use."""
+        """The largest number of vertices that this many triangles can use."""
         return 3 * self.max_faces
 
     @property
     def max_total_texture_pixels(self) -> int:
-        """The most pixels of all different textures together: eight of the largest."""
+        """The largest total number of pixels of all different textures: eight of the largest."""
         return _TEXTURES * self.max_texture_pixels
 
 
 @dataclass
 class MeshSource:
-    """A mesh file, and the only way for a reader to reach the files that it names.
+    """A mesh file, and the only way for a reader to access the files that it names.
 
-    Names are looked up from the file's own folder, below it or below ``root`` and nowhere else: absolute paths, links that
-    lead out and remote addresses are never followed, and only regular files are opened. What is not there is looked for in
-    ``texture_folders`` by its name alone. ``hull_of_points``: vertices without faces are their convex hull.
+    Names are resolved from the file's own folder, inside this folder or ``root``: absolute paths, links that leave it and
+    remote addresses are never followed, and only regular files are opened. Missing files are looked up in ``texture_folders``
+    by file name. ``hull_of_points``: vertices without faces represent their convex hull.
 
-    ``findings`` collects plain sentences about what was left out or assumed, ``textures`` what was decoded, by its bytes'
-    digest.
+    ``findings`` collects sentences about what was left out or assumed, ``textures`` the decoded images by digest of their
+    bytes.
     """
 
     path: Path
@@ -89,20 +89,20 @@ class MeshSource:
 
     @property
     def name(self) -> str:
-        """The file's name as a message shows it."""
+        """The file's name, escaped for messages."""
         return printable_line(self.path.name, max_characters=200)
 
     def data(self) -> bytes:
-        """Return the bytes of the file itself; raises InputError, ``too_large`` where it is larger than the limit."""
+        """Return the bytes of the file itself; raises InputError, ``too_large`` beyond the limit."""
         unreadable, too_large = partial(InputError, "unreadable"), partial(InputError, "too_large")
         data = read_bytes(self.path, self.limits.max_bytes, unreadable, refuse_size=too_large)
         self.bytes_read += len(data)
         return data
 
     def sibling(self, name: str, what: str) -> bytes | None:
-        """Return the bytes of a file that the mesh names, or None with a finding; ``what`` says what it is for.
+        """Return the bytes of a file that the mesh names, or None with a finding; ``what`` describes the file.
 
-        Raises InputError ``too_large`` where all files together are larger than the limit.
+        Raises InputError ``too_large`` if all files together exceed the limit.
         """
         outside = False
         for spelling in spellings(name):
@@ -121,9 +121,9 @@ class MeshSource:
         return None
 
     def _places(self, name: str) -> Iterator[Path | None]:
-        """Yield where a file that the mesh names may lie; None for a place that is not below the root.
+        """Yield candidate paths of a file that the mesh names; None for a path outside the root.
 
-        What names a package or model (``model://NAME/...``, as materials of Gazebo's do) lies in the folder of that name.
+        A name of a package or model (``model://NAME/...``, as in Gazebo's materials) is resolved in the folder of that name.
         """
         scheme = next((scheme for scheme in PACKAGE_SCHEMES if name.startswith(scheme)), None)
         if scheme is None or self.root is None:
@@ -140,37 +140,37 @@ class MeshSource:
         return tuple(sorted(self._contents))
 
     def find(self, sentence: str) -> None:
-        """Note a finding once."""
+        """Add a finding, unless it was added before."""
         line = printable_line(sentence, max_characters=_MESSAGE_CHARACTERS)
         if line not in self.findings and len(self.findings) < _MAX_FINDINGS:
             self.findings.append(line)
 
     def unreadable(self, cause: str, remedy: str) -> InputError:
-        """Return the error for a file that cannot be read: it names the file, the cause and the remedy in one line."""
+        """Return the error for an unreadable file: one line with file, cause and remedy."""
         return self.refused("unreadable", cause, remedy)
 
     def too_large(self, cause: str, remedy: str = _SIMPLIFY) -> InputError:
-        """Return the error for a file that passes a limit."""
+        """Return the error for a file beyond a limit."""
         return self.refused("too_large", cause, remedy)
 
     def refused(self, reason: str, cause: str, remedy: str) -> InputError:
-        """Return the error for a file that is refused for one of the input's reasons."""
+        """Return the error for a file that is refused for one of the reasons of InputError."""
         cause = printable_line(" ".join(cause.split()), max_characters=_MESSAGE_CHARACTERS)
         return InputError(reason, f"{self.name}: {cause}; {remedy}")
 
     def check_faces(self, faces: int) -> None:
-        """Raise InputError ``too_large`` where there are more triangles than the limit."""
+        """Raise InputError ``too_large`` for more triangles than the limit."""
         if faces > self.limits.max_faces:
             raise self.too_large(f"{faces} faces exceed the limit of {self.limits.max_faces}")
 
     def check_vertices(self, vertices: int) -> None:
-        """Raise InputError ``too_large`` where there are more vertices than triangles within the limit can use."""
+        """Raise InputError ``too_large`` for more vertices than the allowed triangles can use."""
         if vertices > self.limits.max_vertices:
             limit = f"{self.limits.max_vertices}, three for each of {self.limits.max_faces} faces"
             raise self.too_large(f"{vertices} vertices exceed the limit of {limit}")
 
     def count_texture(self, pixels: int) -> None:
-        """Count the pixels of one more texture; raises InputError ``too_large`` where all together are too many."""
+        """Count the pixels of one more texture; raises InputError ``too_large`` beyond the total limit."""
         self._texture_pixels += pixels
         limit = self.limits.max_total_texture_pixels
         if self.limits.decode_textures and self._texture_pixels > limit:
@@ -178,26 +178,26 @@ class MeshSource:
             raise self.too_large(cause, "scale them down, or raise the limit of one texture")
 
     def check_parts(self, parts: int) -> None:
-        """Raise InputError ``too_large`` where there are more parts than ``MAX_PARTS``."""
+        """Raise InputError ``too_large`` for more parts than ``MAX_PARTS``."""
         if parts > MAX_PARTS:
             raise self.too_large(f"it has more than {MAX_PARTS} parts", "merge them before exporting")
 
     @contextmanager
     def reading(self, format: str) -> Iterator[None]:
-        """Turn whatever a broken or too large file makes a reader fail with into an InputError."""
+        """Convert any failure of a reader on a broken or too large file to InputError."""
         try:
             yield
         except MemoryError as error:
             raise self.too_large("it needs more memory than is available") from error
         except _BROKEN as error:
             said = f"{type(error).__name__}: {str(error)[:80]}"
-            if isinstance(error, KeyError) and error.args:  # an attribute or an entry that the format wants
+            if isinstance(error, KeyError) and error.args:  # a missing attribute or entry that the format requires
                 said = f"{str(error.args[0])[:60]!r} is not there"
             cause = f"its {format} is broken ({said})"
             raise self.unreadable(cause, "export it again") from error
 
     def _read(self, found: Path, inside: Path) -> bytes:
-        # each file once: many materials may name one texture
+        # each file is read once, as many materials may name one texture
         if found not in self._contents:
             together = f"it and the files that it references have more than {self.limits.max_bytes} bytes"
             left, refuse = self.limits.max_bytes - self.bytes_read, partial(InputError, "unreadable")

@@ -1,4 +1,4 @@
-"""Solids of CAD programs in STEP (ISO 10303-21), whose exact surfaces OpenCASCADE turns into triangles."""
+"""Reader of CAD solids in STEP (ISO 10303-21), whose exact surfaces OpenCASCADE triangulates."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from manitwin.formats.meshes.source import MeshSource
 
 INSTALL = "pip install 'manitwin[cad]'"
 DEFLECTION_MM, ANGLE_RAD = 0.05, 0.2
-"""How far a triangle may lie off its surface, and how far two along it may turn: 32 sides to a round hole."""
+"""Largest distance of a triangle from its surface, and angle between neighbours along it: 32 sides for a round hole."""
 _LIMITS = Limits(seconds=600.0)
 
 
 def read_step(source: MeshSource) -> list[trimesh.Trimesh]:
-    """Read the solids of a STEP file into parts in its own axes, in metres whatever its unit is, with its colours.
+    """Read the solids of a STEP file into parts in its own axes, in metres whatever its unit, with its colours.
 
-    Raises InputError ``wrong_type`` where what ``manitwin[cad]`` installs is missing, ``unreadable``, ``too_large``.
+    Raises InputError ``wrong_type`` if the packages of ``manitwin[cad]`` are not installed, ``unreadable``, ``too_large``.
     """
     if find_spec("cascadio") is None:
         raise source.refused("wrong_type", "the STEP reader is not installed", f"{INSTALL}, or export it as glTF 2.0")
@@ -34,9 +34,9 @@ def read_step(source: MeshSource) -> list[trimesh.Trimesh]:
 
 
 def triangulated(data: bytes) -> bytes:
-    """Return the GLB of a STEP file's content, in metres and in its own axes; empty where nothing in it can be read.
+    """Return the GLB of a STEP file's content, in metres and in its own axes; empty if nothing is readable.
 
-    To be run in a process of its own: OpenCASCADE prints to its output, and crashes on some broken files.
+    To be run in an isolated process: OpenCASCADE prints to standard output, and crashes on some broken files.
     """
     import cascadio
 

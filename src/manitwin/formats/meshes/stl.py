@@ -1,4 +1,4 @@
-"""STL meshes, ASCII and binary."""
+"""Reader of STL meshes, ASCII and binary."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _ROWS = 30_000
 
 
 def read_stl(source: MeshSource) -> list[trimesh.Trimesh]:
-    """Read an STL into one grey part; equal corners are shared so that shading can be smooth.
+    """Read an STL into one grey part; equal corners are merged so that shading can be smooth.
 
-    Raises InputError ``unreadable`` where the file is cut short.
+    Raises InputError ``unreadable`` for a truncated file.
     """
     data = source.data()
     count = int.from_bytes(data[80:84], "little") if len(data) >= _HEADER else 0
@@ -42,7 +42,7 @@ def read_stl(source: MeshSource) -> list[trimesh.Trimesh]:
 
 
 def _ascii(data: bytes, source: MeshSource) -> np.ndarray:
-    """Return the corners ``(3 F, 3)`` of an ASCII STL: what stands on lines that begin with ``vertex``."""
+    """Return the corners ``(3 F, 3)`` of an ASCII STL, from the lines that begin with ``vertex``."""
     blocks: list[np.ndarray] = []
     rows: list[list[bytes]] = []
     facets = count = 0

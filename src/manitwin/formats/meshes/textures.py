@@ -1,4 +1,4 @@
-"""Textures and materials of meshes, brought to the metallic-roughness model of glTF 2.0."""
+"""Textures and materials of meshes in the metallic-roughness model of glTF 2.0."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from manitwin.formats.meshes.ktx2 import KTX2, register_ktx2
 from manitwin.formats.meshes.source import Buffer, MeshSource
 from manitwin.formats.sniff import told_of_no_file_itself
 
-# what real asset packs use; decoders for other formats of Pillow are not reached from untrusted files
+# formats used by real asset packs; untrusted files never reach Pillow's other decoders
 TEXTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF", KTX2)
 register_ktx2()
 DEFAULT_COLOR = (0.8, 0.8, 0.8)
-"""The colour of what has none: the default Kd of OBJ material libraries and of Blender."""
-_MAX_UV = 1e6  # textures may repeat, but not so often
+"""The colour of parts without one: the default Kd of OBJ material libraries and of Blender."""
+_MAX_UV = 1e6  # textures may repeat, but not more often than this
 _MAX_NORMAL = 1e6
 _MAX_ATLAS = 4096
 _HEAD_BYTES = 4096
 _CELL_SIZES = (8, 4)
-"""8 pixels are JPEG's own block, so colours do not leak between cells; 4 are the fewest for two triangles."""
+"""8 pixels are a JPEG block, so that colours do not leak between cells; 4 are the fewest for two triangles."""
 
 
 def decode_texture(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
-    """Decode a texture to mode RGB or RGBA, or return None with a finding where it cannot be read or is too large.
+    """Decode a texture to mode RGB or RGBA, or return None with a finding if it is unreadable or too large.
 
-    Equal bytes are decoded once. Raises InputError ``too_large`` where all textures together have too many pixels.
+    Equal bytes are decoded once. Raises InputError ``too_large`` if all textures together have too many pixels.
     """
     digest = hashlib.sha256(data).hexdigest()
     if digest not in source.textures:
@@ -59,7 +59,7 @@ def _decoded(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
             image.load()
     except (InputError, MemoryError):
         raise
-    except UnidentifiedImageError:  # whose words name an address in memory
+    except UnidentifiedImageError:  # its message contains a memory address
         told = told_of_no_file_itself(bytes(memoryview(data)[:_HEAD_BYTES]))
         source.find(f"texture {name!r} {told or 'is no picture that is read, and was left out'}")
         return None
@@ -71,13 +71,13 @@ def _decoded(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
         image = Image.fromarray((np.asarray(image).astype(np.uint32) >> 8).astype(np.uint8))
     has_alpha = image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info
     mode = "RGBA" if has_alpha else "RGB"
-    return image if image.mode == mode else image.convert(mode)  # a copy of a scan's texture is 17 MB
+    return image if image.mode == mode else image.convert(mode)  # avoids a copy: a scan's texture has 17 MB
 
 
 def color_of_lost_texture(color: Sequence[float]) -> tuple[float, ...]:
-    """Return the base colour of a material whose texture could not be read: the default grey, but a tint is kept.
+    """Return the base colour of a material with an unreadable texture: the default grey, or its tint if it has one.
 
-    A factor of white, grey or black beside a texture says nothing of what the texture showed.
+    A factor of white, grey or black beside a texture says nothing about the texture's colours.
     """
     red, green, blue = color[:3]
     return (*DEFAULT_COLOR, *color[3:]) if red == green == blue else tuple(color)
@@ -96,7 +96,7 @@ def pbr_material(
     alpha_cutoff: float | None = None,
     double_sided: bool = False,
 ) -> PBRMaterial:
-    """Build a material whose factors are all explicit; ``base_color`` is linear RGB or RGBA in 0..1 (kept to 1/255)."""
+    """Build a material with explicit factors; ``base_color`` is linear RGB or RGBA in 0..1 (stored in steps of 1/255)."""
     rgba = np.ones(4)
     rgba[: len(base_color)] = base_color
     if alpha_mode is None:
@@ -126,9 +126,8 @@ def make_part(
 ) -> trimesh.Trimesh:
     """Build one visual part.
 
-    ``vertices`` (V, 3), ``faces`` (F, 3), ``uv`` (V, 2) with the origin at the lower left as trimesh has it,
-    ``normals`` (V, 3) or None; normals that are not unit vectors are dropped, texture coordinates that are no numbers or far
-    out become 0.
+    ``vertices`` (V, 3), ``faces`` (F, 3), ``uv`` (V, 2) with the origin at the lower left as in trimesh, ``normals`` (V, 3) or
+    None. Normals are dropped if any is far from unit length; texture coordinates that are NaN or very large become 0.
     """
     with np.errstate(invalid="ignore"):  # signalling NaNs, which the caller's checks of vertices find
         vertices = np.asarray(vertices, dtype=np.float64)
@@ -150,7 +149,7 @@ def _usable_uv(uv: np.ndarray) -> np.ndarray:
 
 
 def without_unused_vertices(part: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the part with those vertices alone that its faces use, in their order."""
+    """Return the part with only the vertices that its faces use, in their order."""
     used, inverse = np.unique(part.faces, return_inverse=True)
     normals, uv = normals_of(part), uv_of(part)
     return make_part(
@@ -164,7 +163,7 @@ def without_unused_vertices(part: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def material_of(part: trimesh.Trimesh) -> PBRMaterial:
-    """Return a part's material; raises TypeError for a mesh that is no visual part."""
+    """Return a part's material; raises TypeError for a mesh that is not a visual part."""
     material = getattr(part.visual, "material", None)
     if not isinstance(material, PBRMaterial):
         raise TypeError(f"a visual part has a PBRMaterial, not {type(material).__name__}")
@@ -178,20 +177,20 @@ def uv_of(part: trimesh.Trimesh) -> np.ndarray | None:
 
 
 def normals_of(part: trimesh.Trimesh) -> np.ndarray | None:
-    """Return the vertex normals ``(V, 3)`` that a part came with, or None where trimesh would compute them."""
+    """Return the vertex normals ``(V, 3)`` that a part was created with, or None if trimesh would compute them."""
     return np.asarray(part.vertex_normals) if "vertex_normals" in part._cache else None
 
 
 def bake_transform(part: trimesh.Trimesh, matrix: np.ndarray) -> trimesh.Trimesh:
-    """Return the part under an affine transform ``(4, 4)``; one that mirrors turns the winding over."""
+    """Return the part under an affine transform ``(4, 4)``; a reflection reverses the winding."""
     if np.allclose(matrix, np.eye(4), rtol=0, atol=0):
         return part
     linear = matrix[:3, :3]
     normals = normals_of(part)
-    with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
+    with np.errstate(all="ignore"):  # overflows are found when vertices are checked
         determinant = float(np.linalg.det(linear))
         if normals is not None and determinant != 0:
-            # normals go with the inverse transpose; its sign does not follow a mirror, so no flip is due here
+            # normals transform by the inverse transpose, whose sign does not change under reflection, so they are not flipped
             normals = normals @ np.linalg.inv(linear)
             normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
         vertices = part.vertices @ linear.T + matrix[:3, 3]
@@ -218,11 +217,11 @@ def linear_to_srgb(values: np.ndarray) -> np.ndarray:
 def color_by_corner(
     part: trimesh.Trimesh, corner_colors: np.ndarray, source: MeshSource | None = None
 ) -> trimesh.Trimesh:
-    """Return the part with its corner colours ``(F, 3, 3) uint8`` sRGB painted into a base colour texture of its own.
+    """Return the part with corner colours ``(F, 3, 3) uint8`` sRGB painted into its own base colour texture.
 
-    Two triangles share a square cell of the atlas, its diagonal free between them; the corners lie on texel centres, so
-    bilinear sampling gives the linear blend of the three colours. Vertices are then no longer shared between faces.
-    More faces than an atlas of 4096 pixels holds get their mean colour, with a finding.
+    Two triangles share a square cell of the atlas, separated by its diagonal; the corners lie on texel centres, so that
+    bilinear sampling yields the linear blend of the three colours. Faces no longer share vertices. If there are more faces than
+    an atlas of 4096 pixels holds, the part gets the mean colour, with a finding.
     """
     count = len(part.faces)
     across = max(int(np.ceil(np.sqrt((count + 1) // 2))), 1)
@@ -269,7 +268,7 @@ def _paint(corner_colors: np.ndarray, across: int, cell: int) -> np.ndarray:
 
 
 def _blend(second: np.ndarray, third: np.ndarray) -> np.ndarray:
-    """Return barycentric weights ``(..., 3)``; a texel beyond the edge goes on with the same slope."""
+    """Return barycentric weights ``(..., 3)``, extrapolated linearly beyond the edges."""
     return np.stack([1 - second - third, second, third], axis=-1)
 
 

@@ -1,4 +1,4 @@
-"""Meshes of 3MF archives (3D Manufacturing Format), as slicers and CAD programs save what is to be printed."""
+"""Reader of 3MF archives (3D Manufacturing Format), which slicers and CAD programs save for printing."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from manitwin.formats.meshes.three_mf_package import ThreeMfPackage
 from manitwin.formats.meshes.three_mf_slicer import read_notes
 
 _MATTER = ("model", "surface")
-"""Types of objects that are the thing; ``support``, ``solidsupport`` and ``other`` only help to print it (section 4.1)."""
+"""Types of objects that are part of the product; ``support``, ``solidsupport`` and ``other`` only help printing (section 4.1)."""
 _MOST_PLAIN_COLORS = 64
-"""Of one object: so many become parts of one colour each, more are painted into a texture."""
+"""Up to this many colours of an object become separate parts; more are painted into a texture."""
 _DEEPEST = 64
 _DEFAULT_SRGB = np.array([*np.round(255 * linear_to_srgb(np.array(DEFAULT_COLOR))), 255], np.uint8)
 _WHITE = (1.0, 1.0, 1.0)
 
 
 def read_three_mf(source: MeshSource) -> tuple[list[trimesh.Trimesh], float]:
-    """Read all that a 3MF archive builds: parts with transforms baked, and its unit in metres.
+    """Read everything that a 3MF archive builds: parts with transforms applied, and its unit in metres.
 
-    How a thing lies on the plate is how it is printed and says nothing of how it stands, so no up axis is told. Raises InputError
-    ``unreadable`` or ``too_large``.
+    The orientation on the print plate does not imply an up axis, so none is returned. Raises InputError ``unreadable`` or
+    ``too_large``.
     """
     package = ThreeMfPackage(source)
     reader = _Reader(package, source)
@@ -56,7 +56,7 @@ def read_three_mf(source: MeshSource) -> tuple[list[trimesh.Trimesh], float]:
 
 
 class _Reader:
-    """The parts of a package's models, each model and each object's own parts made once for all places."""
+    """The parts of a package's models; each model is read once, and each object's own parts are built once."""
 
     def __init__(self, package: ThreeMfPackage, source: MeshSource):
         self._package, self._source = package, source
@@ -66,13 +66,13 @@ class _Reader:
         self._visited = 0
 
     def model(self, name: str) -> Model:
-        """Return the model that a part of the package holds."""
+        """Return the model in a part of the package."""
         if name not in self._models:
             self._models[name] = read_model(self._package.blocks(name), self._source)
         return self._models[name]
 
     def built(self, model: Model) -> Iterator[trimesh.Trimesh]:
-        """Yield the parts of all that a model builds, in its frame."""
+        """Yield the parts of everything that a model builds, in its frame."""
         items = model.items
         if not items:
             held = {each.object_id for some in model.objects.values() for each in some.components}
@@ -86,7 +86,7 @@ class _Reader:
     def _placed(
         self, component: Component, owner: int, model: Model, parent: np.ndarray, depth: int
     ) -> Iterator[trimesh.Trimesh]:
-        """Yield the parts of a component of the object ``owner``, or of what is built by itself."""
+        """Yield the parts of a component of the object ``owner``, or of a build item."""
         self._visited += 1
         if self._visited > MAX_PARTS or depth > _DEEPEST:
             raise self._source.too_large(f"more than {MAX_PARTS} objects or {_DEEPEST} levels of them", "merge them")
@@ -110,7 +110,7 @@ class _Reader:
             yield from self._placed(each, component.object_id, model, matrix, depth + 1)
 
     def _own_parts(self, found: ModelObject, owner: int, number: int, model: Model) -> Iterator[trimesh.Trimesh]:
-        """Yield the parts of an object's own triangles: one for each texture and each colour."""
+        """Yield the parts of an object's own triangles, one for each texture and each colour."""
         count = len(found.triangles)
         is_matter = self._notes.matter(number, count, self._source)
         textured = is_matter & _has_texture(found, model, self._source)
@@ -126,9 +126,9 @@ class _Reader:
 def _plain_parts(
     found: ModelObject, plain: np.ndarray, unpainted: np.ndarray, model: Model, source: MeshSource
 ) -> Iterator[trimesh.Trimesh]:
-    """Yield the parts of ``plain`` (N,) triangles: one of each colour, or one that has all of them painted on.
+    """Yield the parts of ``plain`` (N,) triangles: one for each colour, or a single one with all colours painted on it.
 
-    ``unpainted`` (F, 4) uint8 sRGB is the colour of each triangle that has none of its own.
+    ``unpainted`` (F, 4) uint8 sRGB is the colour of each triangle that has no colour of its own.
     """
     colors, names = _colors(found, plain, unpainted, model, source)
     keys = np.column_stack([colors.reshape(len(plain), 12), names])
@@ -147,7 +147,7 @@ def _plain_parts(
 def _colors(
     found: ModelObject, triangles: np.ndarray, unpainted: np.ndarray, model: Model, source: MeshSource
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sRGB colours (F, 3, 4) uint8 of some triangles' corners, and the number (F,) of each one's name, -1 of none."""
+    """Return the sRGB corner colours (F, 3, 4) uint8 of triangles, and the index (F,) of each material name, -1 for none."""
     colors = np.repeat(unpainted[triangles][:, None], 3, axis=1)
     names = np.full(len(triangles), -1)
     for group in np.unique(found.groups[triangles]):

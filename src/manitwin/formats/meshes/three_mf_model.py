@@ -1,4 +1,4 @@
-"""The model of a 3MF archive: objects of triangles or of other objects, what colours them, and what is to be built.
+"""Model part of a 3MF archive: objects of triangles or components, their colours, and the build items.
 
 Source: 3MF Core Specification 1.3, Materials and Properties Extension 1.2, Production Extension 1.1 (3MF Consortium).
 """
@@ -16,17 +16,17 @@ from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.xml_walk import walk_xml
 
 UNITS_M = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
-"""Core Specification, section 3.4; a model that does not say its unit is in millimetres."""
+"""Core Specification, section 3.4; the default unit is the millimetre."""
 _NOT_NEEDED = ("/core/", "/material/", "/production/", "/slice/", "/trianglesets/")
-"""Parts of the namespaces of what a model may require and a reader of its triangles needs nothing else of."""
+"""Parts of the namespaces of extensions that a model may require and that reading its triangles does not depend on."""
 NONE = -1
-"""The group of a triangle that has no property."""
+"""The property group of a triangle without properties."""
 _WHITE = (255, 255, 255, 255)
 
 
 @dataclass(frozen=True)
 class Component:
-    """An object that another is made of, or that is built: its id, the part that holds it (None: this one), its transform."""
+    """A component or build item: the object's id, the part that holds it (None: this one), its transform."""
 
     object_id: int
     path: str | None
@@ -37,8 +37,8 @@ class Component:
 class ModelObject:
     """An object: ``vertices`` (V, 3), ``triangles`` (F, 3), or ``components``; ``kind`` is its type.
 
-    ``groups`` (F,) are the ids of each triangle's group of properties, ``NONE`` of one without, ``corners`` (F, 3) its
-    properties' places in the group.
+    ``groups`` (F,) are the ids of the triangles' property groups, ``NONE`` without one, and ``corners`` (F, 3) the indices of
+    the corners' properties in the group.
     """
 
     kind: str
@@ -52,10 +52,10 @@ class ModelObject:
 
 @dataclass
 class Model:
-    """What one part of an archive says; the tables are by resource id.
+    """The content of one model part of an archive, in tables by resource id.
 
-    ``colors`` are (N, 4) uint8 sRGB, ``names`` those of base materials, ``texture_coordinates`` a texture's id and (N, 2), origin
-    at the lower left, ``textures`` the names of parts, ``items`` what is built.
+    ``colors`` are (N, 4) uint8 sRGB, ``names`` those of base materials, ``texture_coordinates`` a texture's id and (N, 2),
+    origin at the lower left, ``textures`` names of package parts, ``items`` the build items.
     """
 
     unit: str = "millimeter"
@@ -79,7 +79,7 @@ def read_model(blocks: Iterable[bytes], source: MeshSource) -> Model:
 
 
 def matrix_of(text: str | None) -> np.ndarray:
-    """Return the transform (4, 4) that twelve numbers say: 3MF multiplies rows (section 3.3). Raises ValueError."""
+    """Return the transform (4, 4) given by twelve numbers: 3MF multiplies row vectors (section 3.3). Raises ValueError."""
     matrix = np.eye(4)
     if text is not None:
         matrix[:3, :] = np.array(text.split(), dtype=np.float64).reshape(4, 3).T
@@ -87,13 +87,13 @@ def matrix_of(text: str | None) -> np.ndarray:
 
 
 def color_of(text: str) -> tuple[int, int, int, int]:
-    """Return the sRGB colour that ``#RRGGBB`` or ``#RRGGBBAA`` says. Raises ValueError."""
+    """Return the sRGB colour of ``#RRGGBB`` or ``#RRGGBBAA``. Raises ValueError."""
     red, green, blue, *alpha = bytes.fromhex(text.strip().removeprefix("#"))
     return red, green, blue, *(alpha or [255])[:1]  # type: ignore[return-value]
 
 
 class _Walker:
-    """Fills a model from its elements; one method for each that counts."""
+    """Builds a model from its elements, with one method for each relevant element."""
 
     def __init__(self, source: MeshSource):
         self.model = Model()
@@ -207,7 +207,7 @@ class _Walker:
         self._mixed = of[np.clip(places, 0, len(of) - 1)]
 
     def _mixture(self, attributes: Mapping[str, str]) -> None:
-        """The colour of a mixture is the mean of its materials' by their shares."""
+        """Append the colour of a mixture: the mean of its materials weighted by their shares."""
         shares = np.zeros(len(self._mixed))
         given = np.array(attributes["values"].split(), np.float64)[: len(shares)]
         shares[: len(given)] = given
@@ -226,7 +226,7 @@ class _Walker:
         self._places.extend((float(attributes["u"]), float(attributes["v"])))
 
     def _several(self, attributes: Mapping[str, str]) -> None:
-        """Of properties in layers the last that is known shows: it lies on top of the others."""
+        """Select the last known layer of layered properties, which is on top of the others."""
         self._group = int(attributes["id"])
         layers = [int(each) for each in attributes["pids"].split()]
         known = [

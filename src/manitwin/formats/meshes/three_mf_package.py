@@ -1,4 +1,4 @@
-"""The archive side of 3MF (Open Packaging Conventions): its parts by name, and which of them is the model."""
+"""Package of a 3MF archive (Open Packaging Conventions): its parts by name, including the model part."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from manitwin.formats.xml_file import parse_xml
 
 _RELATIONSHIPS = "_rels/.rels"
 _MODEL_RELATIONSHIP = "/3dmodel"
-"""How the type of the relationship ends that leads to the model (3MF Core Specification, section 2.1)."""
+"""End of the relationship type that leads to the model (3MF Core Specification, section 2.1)."""
 _CENTRAL_HEADER = b"PK\x01\x02"
-"""How a member's entry in an archive's directory begins (APPNOTE 4.3.12)."""
+"""Start of a member's entry in an archive's central directory (APPNOTE 4.3.12)."""
 _MAX_MEMBERS = 10_000
 _MAX_TEXT_BYTES = 16 << 20
 _BLOCK_BYTES = 1 << 20
@@ -25,12 +25,12 @@ _BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, Runtim
 
 
 class ThreeMfPackage:
-    """The parts of a 3MF archive by name, of at most the limit's bytes unpacked together; nothing is written to disk."""
+    """The parts of a 3MF archive by name, with a limit on the total unpacked size; nothing is written to disk."""
 
     def __init__(self, source: MeshSource):
         self._source = source
         content = source.data()
-        if content.count(_CENTRAL_HEADER) > _MAX_MEMBERS:  # before a list of them is made
+        if content.count(_CENTRAL_HEADER) > _MAX_MEMBERS:  # before a list of them is allocated
             raise source.too_large(f"it has more than {_MAX_MEMBERS} files in its archive", "pack fewer files")
         try:
             self._zip = zipfile.ZipFile(io.BytesIO(content))
@@ -40,7 +40,7 @@ class ThreeMfPackage:
             raise source.unreadable(cause, "download it again") from error
 
     def model(self) -> str:
-        """Return the name of the part that holds the model; raises InputError ``unreadable`` where none is there."""
+        """Return the name of the part with the model; raises InputError ``unreadable`` if there is none."""
         text = self.text(f"/{_RELATIONSHIPS}")
         if text is not None:
             refusal = partial(InputError, "unreadable")
@@ -54,9 +54,9 @@ class ThreeMfPackage:
         return found[0]
 
     def blocks(self, name: str) -> Iterator[bytes]:
-        """Yield the content of a part that must be there, in blocks.
+        """Yield the content of a required part in blocks.
 
-        Raises InputError: ``unreadable`` where it is missing or broken, ``too_large`` beyond the limit.
+        Raises InputError: ``unreadable`` if it is missing or broken, ``too_large`` beyond the limit.
         """
         member = self._members.get(_part_name(name))
         if member is None:
@@ -71,14 +71,14 @@ class ThreeMfPackage:
             raise self._source.unreadable(cause, "download it again") from error
 
     def text(self, name: str) -> bytes | None:
-        """Return the content of a part of no more than 16 MiB, or None where it is not there or larger."""
+        """Return the content of a part of at most 16 MiB, or None if it is missing or larger."""
         member = self._members.get(_part_name(name))
         if member is None or member.file_size > _MAX_TEXT_BYTES:
             return None
         return b"".join(self.blocks(name))
 
     def texture(self, name: str) -> bytes | None:
-        """Return the content of a picture, or None with a finding where it is not there."""
+        """Return the content of a picture, or None with a finding if it is missing."""
         if _part_name(name) not in self._members:
             self._source.find(f"texture {name[:80]!r} is not in the archive; carried on without it")
             return None
@@ -92,5 +92,5 @@ class ThreeMfPackage:
 
 
 def _part_name(name: str) -> str:
-    """Return a part's name as it is compared: from the root, without case (OPC, section 6.2.2.3)."""
+    """Return a part's name normalized for comparison: absolute, case-insensitive (OPC, section 6.2.2.3)."""
     return posixpath.normpath("/" + name.replace("\\", "/").lstrip("/")).lower()

@@ -1,7 +1,7 @@
-"""What slicers note beside a 3MF model: which pieces only help to print, and the colours of their filaments.
+"""Notes of slicers in a 3MF archive: pieces that only help printing, and filament colours.
 
-PrusaSlicer keeps all pieces of an object in one mesh and notes their ranges of triangles (``Slic3r_PE_model.config``); Bambu
-Studio and OrcaSlicer make a component of each (``model_settings.config``).
+PrusaSlicer keeps all pieces of an object in one mesh and notes their triangle ranges (``Slic3r_PE_model.config``); Bambu Studio
+and OrcaSlicer make each piece a component (``model_settings.config``).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Range:
 
 @dataclass
 class SlicerNotes:
-    """The notes of one archive; ids are those of objects and their components. Empty where no slicer made it."""
+    """The notes of one archive; ids are those of objects and their components. Empty for other archives."""
 
     ranges: dict[int, list[Range]] = field(default_factory=dict)
     kinds: dict[tuple[int, int], str] = field(default_factory=dict)
@@ -50,13 +50,13 @@ class SlicerNotes:
     filaments: list[Color | None] = field(default_factory=list)
 
     def helps(self, object_id: int, part_id: int, source: MeshSource) -> bool:
-        """Tell whether a component of an object only helps to print it, with a finding."""
+        """Return whether a component of an object only helps printing; if so, add a finding."""
         kind = self.kinds.get((object_id, part_id), "normal_part")
         _find_left_out(kind, source)
         return kind not in _MATTER
 
     def matter(self, part_id: int, count: int, source: MeshSource) -> np.ndarray:
-        """Return which (F,) of an object's ``count`` triangles are the thing itself, with a finding of what is not."""
+        """Return which (F,) of an object's ``count`` triangles belong to the product, with a finding on the others."""
         is_matter = np.ones(count, bool)
         for each in self.ranges.get(part_id, []):
             if each.kind not in _MATTER:
@@ -65,7 +65,7 @@ class SlicerNotes:
         return is_matter
 
     def colors(self, object_id: int, part_id: int, count: int, default: np.ndarray) -> np.ndarray:
-        """Return the colour (F, 4) uint8 sRGB of each of ``count`` triangles without one of its own: that of its filament."""
+        """Return the filament colours (F, 4) uint8 sRGB of ``count`` triangles, ``default`` if unknown."""
         whole = self.extruders.get((object_id, part_id), self.objects.get(object_id))
         colors = np.broadcast_to(self._filament(whole, default), (count, 4)).copy()
         for each in self.ranges.get(part_id, []):
@@ -81,7 +81,7 @@ class SlicerNotes:
 
 
 def read_notes(package: ThreeMfPackage, source: MeshSource) -> SlicerNotes:
-    """Return what a slicer noted in a package; raises InputError ``unreadable`` where the notes are broken."""
+    """Return a slicer's notes in a package; raises InputError ``unreadable`` if they are broken."""
     notes = SlicerNotes()
     for name in (_PRUSA_PARTS, _BAMBU_PARTS):
         text = package.text(name)
@@ -120,12 +120,12 @@ def _read_object(element: etree._Element, notes: SlicerNotes) -> None:
 
 
 def _metadata(element: etree._Element, key: str) -> str | None:
-    """Return a value of an element's own metadata, not of what is within it."""
+    """Return a metadata value of an element itself, excluding nested elements."""
     return next((each.get("value") for each in element.iterchildren("metadata") if each.get("key") == key), None)
 
 
 def _prusa_colors(text: bytes) -> list[Color | None]:
-    """Return the colour of each extruder: its own where somebody gave it one, else that of its filament."""
+    """Return the colour of each extruder: its own if one is set, else that of its filament."""
     lines = text.decode("utf-8", "replace").splitlines()
     settings = {key.strip("; "): value.strip() for key, _, value in (line.partition("=") for line in lines)}
     own, filaments = (_colors(settings.get(name, "").split(";")) for name in ("extruder_colour", _FILAMENTS))
@@ -141,7 +141,7 @@ def _bambu_colors(text: bytes | None, source: MeshSource) -> list[Color | None]:
 
 
 def _colors(texts: list[str]) -> list[Color | None]:
-    """Return the colours that texts say, None of one that says none: they are counted."""
+    """Return the parsed colours, with None for an empty or invalid one to keep the indices."""
     return [_color(text) for text in texts[:_MOST_FILAMENTS]]
 
 

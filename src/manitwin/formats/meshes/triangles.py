@@ -1,4 +1,4 @@
-"""Shading normals for parts that came without: smooth where the surface is, sharp at creases."""
+"""Shading normals for parts without normals: smooth on smooth surfaces, sharp at creases."""
 
 from __future__ import annotations
 
@@ -8,37 +8,37 @@ import trimesh
 from manitwin.formats.meshes.textures import make_part, material_of, normals_of, uv_of
 from manitwin.geometry.repair.welding import weld_equal
 
-_CREASE_COSINE = np.cos(np.radians(40.0))  # Blender's long-time default for "auto smooth" is 30, 3ds Max's 45
+_CREASE_COSINE = np.cos(np.radians(40.0))  # Blender's long-time default for "auto smooth" is 30 degrees, 3ds Max's 45
 _MAX_PAIRS = 20_000_000
-_ALIKE = 1e-6  # of components of unit vectors: the same written number, after a transform
-_ALONG_COSINE = np.cos(np.radians(10.0))  # what is flat up to rounding stays; no curved surface has one normal
+_ALIKE = 1e-6  # of unit vector components: the same written number, after a transform
+_ALONG_COSINE = np.cos(np.radians(10.0))  # tolerates rounding of flat surfaces; no curved surface has a single normal
 
 
 def shaded(part: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the part with the normals that it came with, else with those of ``with_creased_normals``."""
+    """Return the part with its own normals, or else with those of ``with_creased_normals``."""
     return part if normals_of(part) is not None else with_creased_normals(part)
 
 
 def has_one_false_normal(part: trimesh.Trimesh) -> bool:
-    """Tell whether all normals that a part came with are one vector, and some of its faces look another way."""
+    """Return whether all given normals of a part are one vector although some faces have another direction."""
     normals = normals_of(part)
     if normals is None or not len(part.faces) or np.ptp(normals, axis=0).max() > _ALIKE:
         return False
     triangles = part.vertices[part.faces]
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    along = np.abs(cross @ normals[0])  # either way: a sheet that is seen from both sides has faces of both
+    along = np.abs(cross @ normals[0])  # either sign: a double-sided sheet has faces of both
     return bool((along < _ALONG_COSINE * np.linalg.norm(cross, axis=1)).any())
 
 
 def without_normals(part: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the part as one that came without normals."""
+    """Return the part without normals."""
     return make_part(part.vertices, part.faces, material=material_of(part), name=part.metadata["name"], uv=uv_of(part))
 
 
 def with_creased_normals(part: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the part with a normal for each corner: the mean of the faces around within 40 degrees of its own.
+    """Return the part with a normal for each corner: the mean of the surrounding faces within 40 degrees of its own face.
 
-    Means are weighted by the corner's angle (Thürmer and Wüthrich 1998). Vertices at creases are split.
+    Means are weighted by the corner angles (Thürmer and Wüthrich 1998). Vertices at creases are split.
     """
     triangles = part.vertices[part.faces]
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -49,14 +49,14 @@ def with_creased_normals(part: trimesh.Trimesh) -> trimesh.Trimesh:
     place = weld_equal(np.asarray(part.vertices), part.faces)[1].reshape(-1)
     sizes = np.bincount(place)
     if float((sizes.astype(float) ** 2).sum()) > _MAX_PAIRS:
-        return part  # a fan of thousands of faces: trimesh's own mean over all of them has to do
+        return part  # for a fan of thousands of faces, trimesh's mean over all of them has to suffice
     first, second = _pairs(place, sizes)
     alike = np.einsum("ij,ij->i", corner_normals[first], corner_normals[second]) > _CREASE_COSINE
     alike |= first == second
     sums = np.stack([np.bincount(first[alike], weighted[second[alike], k], minlength=len(place)) for k in range(3)], 1)
     norms = np.linalg.norm(sums, axis=1)
     shading = np.where(norms[:, None] > 1e-12, sums / np.where(norms > 1e-12, norms, 1.0)[:, None], (0.0, 0.0, 1.0))
-    # one integer a corner, of its vertex and its normal in steps of 1/1000, sorts much faster than rows
+    # sorting one integer for each corner, of vertex and normal in steps of 1/1000, is much faster than sorting rows
     steps = np.round(shading * 1000).astype(np.int64) + 1000
     keys = ((part.faces.reshape(-1) * 2001 + steps[:, 0]) * 2001 + steps[:, 1]) * 2001 + steps[:, 2]
     _, kept, inverse = np.unique(keys, return_index=True, return_inverse=True)
@@ -82,7 +82,7 @@ def _corner_angles(triangles: np.ndarray) -> np.ndarray:
 
 
 def _pairs(place: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return all ordered pairs of corners at the same place, each with itself too."""
+    """Return all ordered pairs of corners at the same position, including each corner with itself."""
     order = np.argsort(place, kind="stable")
     starts = np.cumsum(sizes) - sizes
     repeats = sizes[place[order]]
@@ -92,10 +92,10 @@ def _pairs(place: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def triangle_fans(sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Cut polygons of ``sizes (P,)`` corners, listed one after another, into fans about their first corner.
+    """Cut polygons with ``sizes (P,)`` corners, listed consecutively, into fans about their first corners.
 
-    Returns the corners' places in that list ``(F, 3)`` and the polygon of every triangle ``(F,)``; polygons of
-    fewer than three corners give none.
+    Returns the corners' indices in that list ``(F, 3)`` and the polygon of every triangle ``(F,)``; polygons with fewer than
+    three corners yield none.
     """
     inner = np.maximum(sizes - 2, 0)
     owner = np.repeat(np.arange(len(sizes)), inner)

@@ -1,4 +1,4 @@
-"""What USD says of a file that it cannot read, in one line for people."""
+"""Errors of the USD library as one readable line."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from pxr import Tf
 from manitwin.formats.printable import printable_line
 
 _SAID = re.compile(r"at line \d+ in file \S+ : '(.*?)\s*'\s*(?=\n\s*Error in|\Z)", re.DOTALL)
-"""How Tf writes an error: where in USD's own source it was raised, and what was said there."""
+"""The form of Tf errors: the location in USD's own source, and the message."""
 _ITS_OWN_NAMES = re.compile(r"\bpxrInternal\w*::(?:\w+::)*")
 _PLACE = re.compile(r"^\S*:(\d+):\d+: ")
 _CHARACTERS = 160
 
 
 def cause_of(error: Tf.ErrorException) -> str:
-    """Return the first thing that USD said is wrong, with the line of the file where it says one; "" where it said nothing."""
+    """Return the first message of USD, with the line of the file if stated; "" if there is none."""
     said = [_ITS_OWN_NAMES.sub("", " ".join(each.split())) for each in _SAID.findall(_text_of(error))]
     if not said:
         return ""
@@ -26,13 +26,13 @@ def cause_of(error: Tf.ErrorException) -> str:
 
 
 def broken(error: Tf.ErrorException) -> str:
-    """Return the cause of a refusal: that the USD is broken, and how."""
+    """Return the cause for an error message about broken USD."""
     cause = cause_of(error)
     return f"its USD is broken ({cause})" if cause else "its USD is broken"
 
 
 def _text_of(error: Tf.ErrorException) -> str:
-    """Return all that USD said; it repeats bytes of the file, which may be no text."""
+    """Return all messages of USD, which may repeat bytes of the file that are not valid text."""
     try:
         return str(error)
     except UnicodeDecodeError as undecoded:

@@ -1,4 +1,4 @@
-"""The prims of a USD stage and where they stand, with those that point instancers repeat."""
+"""Prims of a USD stage with their transforms, including instances of point instancers."""
 
 from __future__ import annotations
 
@@ -11,21 +11,20 @@ from pxr import Tf, Usd, UsdGeom
 from manitwin.formats.meshes.source import MeshSource
 
 MAX_INSTANCES = 4096
-"""Of all instancers together: as many shapes as one asset may have."""
+"""Limit over all instancers: the number of shapes that one asset may have."""
 MAX_PLACED = 100_000
 _DEEPEST = 4
 _TIME = Usd.TimeCode.EarliestTime()
 _DRAWN = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 _OF_PROTOTYPES = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)
-"""Prototypes are often classes or overrides, which are not drawn where they stand."""
+"""Traversal of prototypes, which are often classes or overrides that are not drawn in place."""
 
 
 @dataclass(frozen=True)
 class PlacedPrim:
-    """A prim and its transform ``(4, 4)`` to the stage's world, in the stage's unit.
+    """A prim and its transform ``(4, 4)`` to world, in the stage's unit.
 
-    ``copy`` is 0 of what stands by itself. Of what is below the ``prototype`` of an ``instancer`` it is the number of the place
-    at which that repeats it.
+    ``copy`` is 0 for a prim in place. Below the ``prototype`` of an ``instancer``, it is the number of the instance.
     """
 
     prim: Usd.Prim
@@ -35,7 +34,7 @@ class PlacedPrim:
     instancer: PlacedPrim | None = None
 
     def lineage(self) -> Iterator[Usd.Prim]:
-        """Yield the prim and those above it, the nearest first; above a prototype come its instancer and those above that."""
+        """Yield the prim and its ancestors, nearest first; a prototype is followed by its instancer and that one's ancestors."""
         prim = self.prim
         while prim and not prim.IsPseudoRoot():
             yield prim
@@ -46,7 +45,7 @@ class PlacedPrim:
             yield from self.instancer.lineage()
 
     def is_hidden(self) -> bool:
-        """Tell whether it, or what it hangs from, is invisible."""
+        """Return whether the prim or one of its ancestors is invisible."""
         if self.instancer is None:
             return bool(UsdGeom.Imageable(self.prim).ComputeVisibility() == UsdGeom.Tokens.invisible)
         return any(
@@ -57,10 +56,10 @@ class PlacedPrim:
 
 
 def placed_prims(stage: Usd.Stage, source: MeshSource) -> list[PlacedPrim]:
-    """Return all prims that are drawn, in the order of the stage; below an instancer what it repeats, where it repeats it.
+    """Return all drawn prims in stage order, with the instances of point instancers.
 
-    Raises InputError ``unreadable`` for an instancer whose values do not belong together, ``too_large`` for more than
-    ``MAX_INSTANCES`` instances. Source: the schema UsdGeomPointInstancer.
+    Raises InputError ``unreadable`` for an instancer with inconsistent values, ``too_large`` for more than ``MAX_INSTANCES``
+    instances. Source: the schema UsdGeomPointInstancer.
     """
     places = _Places(source)
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), _DRAWN))
@@ -74,7 +73,7 @@ def placed_prims(stage: Usd.Stage, source: MeshSource) -> list[PlacedPrim]:
 
 
 class _Places:
-    """What was placed so far."""
+    """Collector of placed prims."""
 
     def __init__(self, source: MeshSource):
         self._source = source
@@ -83,10 +82,10 @@ class _Places:
         self.found: list[PlacedPrim] = []
 
     def to_world(self, prim: Usd.Prim) -> np.ndarray:
-        return np.array(self._transforms.GetLocalToWorldTransform(prim)).T  # USD multiplies rows
+        return np.array(self._transforms.GetLocalToWorldTransform(prim)).T  # USD multiplies row vectors
 
     def repeat(self, instancer: PlacedPrim, depth: int) -> None:
-        """Place what an instancer repeats."""
+        """Place the instances of an instancer."""
         if depth > _DEEPEST:
             raise self._refused(instancer, f"repeats instancers more than {_DEEPEST} deep")
         targets = UsdGeom.PointInstancer(instancer.prim).GetPrototypesRel().GetForwardedTargets()
@@ -113,7 +112,7 @@ class _Places:
                 self.repeat(placed, depth + 1)
 
     def _instances(self, instancer: PlacedPrim, prototypes: int) -> Iterator[tuple[int, np.ndarray]]:
-        """Yield the prototype of each instance that is there, and its transform ``(4, 4)`` to the instancer."""
+        """Yield the prototype index of each visible instance, and its transform ``(4, 4)`` to the instancer."""
         api = UsdGeom.PointInstancer(instancer.prim)
         numbers = np.asarray(api.GetProtoIndicesAttr().Get(_TIME) or [], np.int64)
         if len(numbers) + self._copies > MAX_INSTANCES:

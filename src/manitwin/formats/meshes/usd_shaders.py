@@ -1,4 +1,4 @@
-"""The shaders of a USD material: what they are, what their inputs say, and how the texture that they read lies."""
+"""Shaders of USD materials: their kinds, inputs, and texture placement."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from pxr import Sdf, Usd, UsdShade
 
 _CONTEXTS = ("", "mdl", "mtlx")
-"""A material's universal output, and those of renderers, which are looked at where that is not read."""
+"""The universal output of a material, and those of renderers, which are used if the former is not supported."""
 _MOST_UPSTREAM = 32
 
 
 def shaders_of(material: UsdShade.Material) -> Iterator[UsdShade.Shader]:
-    """Yield what a material is drawn by: its universal surface, then those of renderers that are known."""
+    """Yield the surface shaders of a material: the universal one, then those of known renderers."""
     for context in _CONTEXTS:
         shader, _, _ = material.ComputeSurfaceSource(context)
         if shader:
@@ -22,12 +22,12 @@ def shaders_of(material: UsdShade.Material) -> Iterator[UsdShade.Shader]:
 
 
 def kind_of(shader: UsdShade.Shader) -> str:
-    """Return the name of a shader's kind: its identifier, or that of its MDL."""
+    """Return the kind of a shader: its identifier, or that of its MDL."""
     return str(shader.GetIdAttr().Get() or shader.GetSourceAssetSubIdentifier("mdl") or "")[:60]
 
 
 def asset_of(socket: UsdShade.Input | None) -> tuple[Sdf.Layer, str] | None:
-    """Return the file that an input names, and the layer that names it; None where it names none."""
+    """Return the layer and the path of the file that an input names; None if it names none."""
     attributes = socket.GetValueProducingAttributes() if socket else []
     asset = attributes[0].Get() if attributes else None
     if not isinstance(asset, Sdf.AssetPath) or not asset.path:
@@ -36,15 +36,15 @@ def asset_of(socket: UsdShade.Input | None) -> tuple[Sdf.Layer, str] | None:
 
 
 def value_of(socket: UsdShade.Input | None) -> Any:
-    """Return an input's constant, None where it has none."""
+    """Return an input's constant, None if it has none."""
     attributes = socket.GetValueProducingAttributes() if socket else []
     return attributes[0].Get() if attributes else None
 
 
 def numbers_of(value: Any, default: tuple[float, ...]) -> tuple[float, ...]:
-    """Return as many numbers of a value as ``default`` has (all, where that is empty); ``default`` where it has not so many.
+    """Return as many numbers of a value as ``default`` has (all if it is empty), or ``default`` if there are fewer.
 
-    Inputs of shaders are of whatever type the file writes.
+    Shader inputs may have any type that the file writes.
     """
     try:
         numbers = np.asarray(value, np.float64).reshape(-1)
@@ -56,13 +56,13 @@ def numbers_of(value: Any, default: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def first_number(shader: UsdShade.Shader, default: float, *names: str) -> float:
-    """Return the number that the first of these inputs says that has one."""
+    """Return the number of the first of these inputs that has one."""
     said = (numbers_of(value_of(shader.GetInput(name)), (np.nan,))[0] for name in names)
     return next((each for each in said if np.isfinite(each)), default)
 
 
 def upstream(attributes: Sequence[Usd.Attribute]) -> Iterator[UsdShade.Shader]:
-    """Yield the shaders that attributes belong to, and those that these are connected to, the nearest first."""
+    """Yield the shaders of attributes and those connected to them, nearest first."""
     waiting = [attribute.GetPrim() for attribute in attributes]
     seen: set[Sdf.Path] = set()
     while waiting and len(seen) < _MOST_UPSTREAM:
@@ -79,21 +79,21 @@ def upstream(attributes: Sequence[Usd.Attribute]) -> Iterator[UsdShade.Shader]:
 
 
 def same_picture(reader: UsdShade.Shader | None, other: UsdShade.Shader | None) -> bool:
-    """Tell whether two texture readers read one file."""
+    """Return whether two texture readers read the same file."""
     if reader is None or other is None:
         return False
     return asset_of(reader.GetInput("file")) == asset_of(other.GetInput("file"))
 
 
 def tint_of(reader: UsdShade.Shader | None) -> tuple[float, ...]:
-    """Return what a texture reader multiplies its colours with (UsdUVTexture, ``scale``)."""
+    """Return the factor by which a texture reader multiplies its colours (UsdUVTexture, ``scale``)."""
     return (1.0, 1.0, 1.0) if reader is None else numbers_of(value_of(reader.GetInput("scale")), (1.0, 1.0, 1.0))
 
 
 def placing(reader: UsdShade.Shader | None) -> tuple[str | None, np.ndarray | None]:
-    """Return the primvar by which a texture lies, and how its coordinates are changed ``(3, 3)``; None for the usual.
+    """Return the primvar of a texture's coordinates, and the transform ``(3, 3)`` on them; None for the defaults.
 
-    UsdTransform2d scales, turns counter-clockwise in degrees, and moves. Source: the UsdPreviewSurface specification.
+    UsdTransform2d scales, rotates counter-clockwise in degrees, and translates. Source: the UsdPreviewSurface specification.
     """
     change = np.eye(3)
     socket = None if reader is None else reader.GetInput("st")

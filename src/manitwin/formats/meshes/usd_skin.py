@@ -1,4 +1,4 @@
-"""Meshes of USD stages that are bound to a skeleton, in the first pose that the stage holds (UsdSkel)."""
+"""Skinned meshes of USD stages, in the first pose of the stage (UsdSkel)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _SMALLEST = 1e-12
 
 
 def is_bound(prim: Usd.Prim) -> bool:
-    """Tell whether a mesh is bound to a skeleton."""
+    """Return whether a mesh is bound to a skeleton."""
     return bool(prim.HasAPI(UsdSkel.BindingAPI) and UsdSkel.BindingAPI(prim).GetInheritedSkeleton())
 
 
 class Skeletons:
-    """The skeletons of a stage, each looked at once."""
+    """The skeletons of a stage, each queried once."""
 
     def __init__(self, stage: Usd.Stage, source: MeshSource):
         self._source = source
@@ -27,9 +27,9 @@ class Skeletons:
                 self._cache.Populate(UsdSkel.Root(prim), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
 
     def posed(self, prim: Usd.Prim, points: np.ndarray) -> np.ndarray:
-        """Return a bound mesh's points ``(V, 3)`` as its skeleton moves them, in the mesh's own frame.
+        """Return a bound mesh's points ``(V, 3)`` posed by its skeleton, in the mesh's own frame.
 
-        That is the pose of the first frame of its animation, of the rest pose without one. Raises InputError ``unreadable``.
+        The pose is that of the first frame of its animation, or else the rest pose. Raises InputError ``unreadable``.
         """
         try:
             moved = self._moved(prim, points)
@@ -52,7 +52,7 @@ class Skeletons:
         if not skin.ComputeSkinnedPoints(joints, moved, time):
             return None
         in_skeleton = np.asarray(moved, np.float64)
-        to_world = np.array(self._transforms.GetLocalToWorldTransform(skeleton.GetPrim()))  # USD multiplies rows
+        to_world = np.array(self._transforms.GetLocalToWorldTransform(skeleton.GetPrim()))  # USD multiplies row vectors
         mesh_to_world = np.array(self._transforms.GetLocalToWorldTransform(prim))
         if abs(np.linalg.det(mesh_to_world)) < _SMALLEST:
             return None

@@ -1,4 +1,4 @@
-"""Materials of USD stages brought to glTF's model: UsdPreviewSurface, Omniverse's OmniPBR, and the colour of others."""
+"""Conversion of USD materials to glTF's model: UsdPreviewSurface, Omniverse's OmniPBR, and the base colour of others."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ PREVIEW = "UsdPreviewSurface"
 _COLORS = ("diffuse_color_constant", "base_color", "diffuseColor", "diffuse_reflection_color", "diffuse_color")
 """Base colours of OmniPBR, of MaterialX's standard_surface, open_pbr_surface and gltf_pbr, its UsdPreviewSurface, OmniSurface."""
 _OMNI_PBR, _OMNI_TEXTURE, _OMNI_COLOR = "OmniPBR", "diffuse_texture", (0.2, 0.2, 0.2)
-"""Omniverse's usual material, in MDL: how its kinds begin, the texture of its base colour, and that colour where none is said."""
+"""Omniverse's default material in MDL: prefix of its kinds, base colour texture input, and default base colour."""
 
 
 @dataclass(frozen=True)
 class UsdSurface:
-    """A material, and how its texture lies: by which primvar (None: the usual one), and ``uv_change`` (3, 3) on its rows."""
+    """A material and its texture placement: a primvar (None: the default one), and ``uv_change`` (3, 3) on the coordinates."""
 
     material: PBRMaterial
     uv_set: str | None = None
@@ -53,7 +53,7 @@ class UsdSurface:
 
 
 class PreviewSurfaces:
-    """Materials by the prim that they are bound to, each built once; an unbound prim gets a nameless grey one."""
+    """Materials by the prim they are bound to, each built once; an unbound prim gets an unnamed grey one."""
 
     def __init__(self, archive: UsdzArchive, source: MeshSource):
         self._archive, self._source = archive, source
@@ -66,7 +66,7 @@ class PreviewSurfaces:
         return linear_to_srgb(np.clip(linear, 0, 1))
 
     def of(self, prim: Usd.Prim) -> UsdSurface:
-        """Return the surface that is bound to a prim."""
+        """Return the surface bound to a prim."""
         material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
         key = str(material.GetPath()) if material else ""
         if key not in self._materials:
@@ -118,9 +118,9 @@ class PreviewSurfaces:
         )
 
     def _other(self, name: str, shader: UsdShade.Shader, socket: UsdShade.Input | None) -> UsdSurface:
-        """Return what a surface of another kind says of its base colour, and OmniPBR's of its gloss.
+        """Return the base colour of a surface of another kind, and the metalness and roughness of known inputs.
 
-        Source: NVIDIA's OmniPBR.mdl: a texture takes the place of the constant colour, a tint goes over both.
+        Source: NVIDIA's OmniPBR.mdl: a texture replaces the constant colour, and a tint multiplies either.
         """
         color, texture = (_OMNI_COLOR, None) if socket is None else self._color_of(socket)
         named = asset_of(shader.GetInput(_OMNI_TEXTURE))
@@ -150,7 +150,7 @@ class PreviewSurfaces:
         return UsdSurface(material, None, None if texture is None or np.allclose(change, np.eye(3)) else change)
 
     def _color_of(self, socket: UsdShade.Input) -> tuple[tuple[float, ...], Image.Image | None]:
-        """Return an input's colour, or the picture that the nodes before it read."""
+        """Return an input's colour, or the picture that its upstream nodes read."""
         color = numbers_of(value_of(socket), ())
         if len(color) >= len(DEFAULT_COLOR):
             return color[: len(DEFAULT_COLOR)], None
@@ -166,7 +166,7 @@ class PreviewSurfaces:
     def _input(
         self, shader: UsdShade.Shader, name: str, default: Any, channel: str
     ) -> tuple[Any, Image.Image | None, UsdShade.Shader | None]:
-        """Return an input's constant, the texture that it is connected to (one channel of it for a scalar), and its reader."""
+        """Return an input's constant, its connected texture (one channel of it for a scalar), and the texture's reader."""
         socket = shader.GetInput(name)
         if not socket:
             return default, None, None
@@ -190,8 +190,8 @@ class PreviewSurfaces:
         return None if named is None else self._picture(*named)
 
     def _picture(self, layer: Sdf.Layer, path: str) -> Image.Image | None:
-        """Return the picture that a layer names, None with a finding where it cannot be read."""
-        # the path counts from the layer that wrote it; in a package that is the member's own folder
+        """Return the picture that a layer names, or None with a finding if it is unreadable."""
+        # the path is relative to the layer that wrote it; in a package, to the member's folder
         inner = layer.identifier
         inner = inner[inner.rfind("[") + 1 : -1] if inner.endswith("]") else (self._archive.root or "")
         name = path if path.startswith(("/", "\\")) else posixpath.join(posixpath.dirname(inner), path)
@@ -205,9 +205,9 @@ class PreviewSurfaces:
 
 
 def flat_colored(surface: UsdSurface, display: np.ndarray | None) -> PBRMaterial:
-    """Return the material of a shape that has no texture coordinates: a texture gives its mean colour.
+    """Return the material of a shape without texture coordinates: a texture is replaced by its mean colour.
 
-    ``display (N, 3) uint8`` sRGB are the colours of a shape that no material is bound to, of which the first counts.
+    ``display (N, 3) uint8`` are sRGB colours of a shape without a bound material, of which the first is used.
     """
     material = surface.material
     if material.name is None:

@@ -1,4 +1,4 @@
-"""The unit that a USD stage says its lengths and masses are in."""
+"""Length and mass units of a USD stage."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from pxr import Usd, UsdGeom, UsdPhysics
 
 
 def metres_per_unit(stage: Usd.Stage) -> float | None:
-    """Return one of the stage's lengths in metres, None where it does not say (USD's rule is then 0.01)."""
+    """Return the stage's length unit in metres, None if not stated (USD's default is 0.01)."""
     return _said(stage, str(UsdGeom.Tokens.metersPerUnit))
 
 
 def kilograms_per_unit(stage: Usd.Stage) -> float | None:
-    """Return one of the stage's masses in kilograms, None where it does not say (USD's rule is then 1)."""
+    """Return the stage's mass unit in kilograms, None if not stated (USD's default is 1)."""
     return _said(stage, str(UsdPhysics.Tokens.kilogramsPerUnit))
 
 
 def _said(stage: Usd.Stage, key: str) -> float | None:
-    """Return a number of the stage's metadata, which the session layer overrides and the root layer says.
+    """Return a number of the stage's metadata, from the session layer or else the root layer.
 
-    Read from the layers, whose numbers come in any type: ``UsdGeom.GetStageMetersPerUnit`` and their like raise for a binary
-    file that holds single precision where the schema says double, as Blender's before 3.0 do.
+    It is read from the layers, which may store any numeric type: ``UsdGeom.GetStageMetersPerUnit`` and similar functions raise
+    for a binary file with single precision in place of double, as written by Blender before 3.0.
     """
     for layer in (stage.GetSessionLayer(), stage.GetRootLayer()):
         root = layer.pseudoRoot if layer is not None else None

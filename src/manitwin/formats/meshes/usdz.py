@@ -1,4 +1,4 @@
-"""USDZ meshes (Universal Scene Description packages) with UsdPreviewSurface materials."""
+"""Reader of USDZ meshes (Universal Scene Description packages) with UsdPreviewSurface materials."""
 
 from __future__ import annotations
 
@@ -25,11 +25,10 @@ _UV_NAMES = ("st", "st0", "st_0", "UVMap", "uv", "map1", "Texture_uv")
 def read_usdz(
     source: MeshSource,
 ) -> tuple[list[trimesh.Trimesh], float | None, str | None, list[str], int]:
-    """Read all visible meshes of a USDZ package: parts with transforms baked, unit in metres, up axis 'y' | 'z'.
+    """Read all visible meshes of a USDZ package: parts with transforms applied, unit in metres, up axis 'y' | 'z'.
 
-    To be run in a process of its own: what was found, and the bytes that were read, come back too. A stage that does not say
-    its unit is in centimetres (USD's fallback), which is told as None. Raises InputError ``unreadable``, ``animated`` (value
-    clips).
+    To be run in an isolated process, so that findings and the number of bytes read are returned too. A stage without a unit is
+    in centimetres (USD's fallback), which is returned as None. Raises InputError ``unreadable``, ``animated`` (value clips).
     """
     archive = UsdzArchive(source)
     if archive.root is None:
@@ -61,14 +60,14 @@ def _parts(stage: Usd.Stage, archive: UsdzArchive, source: MeshSource) -> list[t
     for placed in placed_prims(stage, source):
         prim = placed.prim
         if not prim.IsA(UsdGeom.Mesh):
-            drawn_for_people = UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide  # as grasp lines are
+            drawn_for_people = UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide  # such as grasp lines
             if not drawn_for_people and prim.IsA(UsdGeom.Gprim):
                 source.find(f"{prim.GetTypeName()} prims in it were left out: only meshes are read")
             continue
         if placed.is_hidden() or UsdGeom.Imageable(prim).ComputePurpose() in ("guide", "proxy"):
             source.find("hidden, guide or proxy meshes in it were left out")
             continue
-        if prim.GetPath() not in made:  # what an instancer repeats is made once
+        if prim.GetPath() not in made:  # instanced meshes are converted once
             made[prim.GetPath()] = mesh_parts(UsdGeom.Mesh(prim), surfaces, skeletons, source)
         for part in made[prim.GetPath()]:
             faces += len(part.faces)
@@ -81,7 +80,7 @@ def _parts(stage: Usd.Stage, archive: UsdzArchive, source: MeshSource) -> list[t
 def mesh_parts(
     mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, skeletons: Skeletons, source: MeshSource
 ) -> list[trimesh.Trimesh]:
-    """Return a mesh prim as one part a material subset, as its skeleton holds it where it is bound to one."""
+    """Return one part for each material subset of a mesh prim, in the pose of its skeleton if it is bound to one."""
     polygons = mesh_polygons(mesh, source)
     if polygons is None or len(polygons[1]) == 0:
         return []
@@ -109,7 +108,7 @@ def mesh_parts(
             continue
         uv = _uv(mesh, surface.uv_set, indices, len(points))
         if uv is not None and surface.uv_change is not None:
-            with np.errstate(all="ignore"):  # what overflows, make_part takes for 0
+            with np.errstate(all="ignore"):  # make_part replaces overflows by 0
                 uv = uv @ surface.uv_change[:2, :2].T + surface.uv_change[:2, 2]
         # corners that share a point and a texture coordinate share a vertex
         keys = [indices[flat].astype(np.float64)[:, None]] + ([] if uv is None else [uv[flat]])
@@ -128,16 +127,16 @@ def mesh_parts(
 
 
 def _is_subdivided(mesh: UsdGeom.Mesh) -> bool:
-    """Tell whether a mesh says that it is drawn subdivided; where it says nothing, what wrote it mostly meant its polygons."""
+    """Return whether a mesh explicitly requests subdivision; without a scheme, its writer mostly meant the polygons."""
     scheme = mesh.GetSubdivisionSchemeAttr()
     smooth = (UsdGeom.Tokens.catmullClark, UsdGeom.Tokens.loop)
     return bool(scheme.HasAuthoredValue() and scheme.Get() in smooth)
 
 
 def mesh_polygons(mesh: UsdGeom.Mesh, source: MeshSource) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Return a mesh prim's points ``(V, 3)``, the sizes of its polygons and the points at their corners; None without any.
+    """Return a mesh prim's points ``(V, 3)``, polygon sizes and corner indices; None if an attribute is missing.
 
-    Raises InputError ``unreadable`` where they do not belong together.
+    Raises InputError ``unreadable`` if they are inconsistent.
     """
     attributes = (mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
     points, sizes, indices = (_value(attribute) for attribute in attributes)
@@ -164,9 +163,9 @@ def _subsets(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, count: int) -> Itera
 
 
 def _uv(mesh: UsdGeom.Mesh, wanted: str | None, indices: np.ndarray, points: int) -> np.ndarray | None:
-    """Return texture coordinates by corner ``(C, 2)``, origin at the lower left as USD has it.
+    """Return texture coordinates by corner ``(C, 2)``, origin at the lower left as in USD.
 
-    ``wanted`` is the primvar that the material reads; where the mesh does not have it, the usual ones are looked up.
+    ``wanted`` is the primvar that the material reads; if the mesh does not have it, common names are tried.
     """
     api = UsdGeom.PrimvarsAPI(mesh)
     named = [api.GetPrimvar(name) for name in (*((wanted,) if wanted else ()), *_UV_NAMES)]
@@ -185,7 +184,7 @@ def _uv(mesh: UsdGeom.Mesh, wanted: str | None, indices: np.ndarray, points: int
 
 
 def display_color(prim: Usd.Prim) -> np.ndarray | None:
-    """Return the displayColor of a shape as ``(N, 3) uint8`` sRGB, None where it has none."""
+    """Return the displayColor of a shape as ``(N, 3) uint8`` sRGB, or None."""
     primvar = UsdGeom.Gprim(prim).GetDisplayColorPrimvar()
     given = primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()) if primvar and primvar.HasValue() else None
     linear = _rows(given, 3)
@@ -209,10 +208,10 @@ def _display_colors(mesh: UsdGeom.Mesh, indices: np.ndarray, sizes: np.ndarray) 
 
 
 def _rows(values: Any, columns: int) -> np.ndarray | None:
-    """Return values of a primvar as ``(N, columns)``, None where there are none or its type is none that USD knows."""
+    """Return values of a primvar as ``(N, columns)``, None if there are none or USD does not know their type."""
     try:
         return None if values is None else np.asarray(values, np.float64).reshape(-1, columns)
-    except (TypeError, ValueError):  # a type that nothing registered comes as it is written
+    except (TypeError, ValueError):  # a value of an unregistered type is returned as written
         return None
 
 

@@ -1,4 +1,4 @@
-"""The archive side of USDZ: members, and a check that no layer in it reaches outside of it."""
+"""Archive of a USDZ package: its members, and a check that no layer refers outside it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BLOCK_BYTES = 1 << 20
 
 
 class UsdzArchive:
-    """The members of a USDZ package by name, without ever unpacking them to disk."""
+    """The members of a USDZ package by name, without unpacking them to disk."""
 
     def __init__(self, source: MeshSource):
         self._source = source
@@ -29,7 +29,7 @@ class UsdzArchive:
         if size > source.limits.max_bytes:
             raise source.too_large(f"{size} bytes exceed the limit of {source.limits.max_bytes}")
         members_said = _central_headers(source)
-        if members_said > _MAX_MEMBERS:  # before a list of them is made
+        if members_said > _MAX_MEMBERS:  # before a list of them is allocated
             raise source.too_large(f"{members_said} members in the archive", "pack fewer files")
         try:
             self._zip = zipfile.ZipFile(source.path)
@@ -39,7 +39,7 @@ class UsdzArchive:
                 f"truncated or broken: its archive cannot be read ({str(error)[:60]})", "download it again"
             ) from error
         for member in members:
-            # USDZ allows neither compression nor encryption, which leaves nothing for a ZIP bomb to do
+            # USDZ allows neither compression nor encryption, which excludes ZIP bombs
             if (
                 member.compress_type != zipfile.ZIP_STORED
                 or member.flag_bits & 1
@@ -74,10 +74,10 @@ class UsdzArchive:
             return None
 
     def check_layers(self) -> None:
-        """Refuse a package with a layer that names a layer outside of it; raises InputError ``unreadable``.
+        """Refuse a package with a layer that names a layer outside it; raises InputError ``unreadable``.
 
-        Every layer of the archive is looked at, used or not, before a stage is composed: composing would open what they
-        name.
+        Every layer of the archive is checked, used or not, before a stage is composed, because composition would open the named
+        layers.
         """
         for name in self.names:
             if not name.lower().endswith(_LAYERS):
@@ -102,7 +102,7 @@ class UsdzArchive:
 
 
 def _central_headers(source: MeshSource) -> int:
-    """Return how often the signature of a member's entry in an archive's directory (APPNOTE 4.3.12) stands in the file."""
+    """Count the signatures of central directory entries (APPNOTE 4.3.12) in the file."""
     count, rest = 0, b""
     with open_regular(source.path, partial(InputError, "unreadable")) as stream:
         while block := stream.read(_BLOCK_BYTES):
@@ -112,7 +112,7 @@ def _central_headers(source: MeshSource) -> int:
 
 
 def package_path(path: Path, member: str) -> str:
-    """Return how USD names a member of a package."""
+    """Return USD's name for a member of a package."""
     return f"{path}[{member}]"
 
 

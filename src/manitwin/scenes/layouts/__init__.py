@@ -1,1 +1,1 @@
-"""Layout generation (paper, Scene Layout Generation): several twins on furniture, at rest, that do not collide."""
+"""Layout generation (paper, Scene Layout Generation): several twins at rest on furniture without collisions."""

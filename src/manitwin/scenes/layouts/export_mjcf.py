@@ -1,4 +1,4 @@
-"""A layout as an MJCF folder: one scene file that attaches every twin's own export, each beside it once.
+"""Export of a layout as an MJCF folder: a scene file that attaches the exports of its twins, each stored once.
 
 Source: MuJoCo XML reference, ``asset/model`` and ``attach``.
 """
@@ -25,7 +25,7 @@ TWINS = "twins"
 def export_mjcf(scene: Scene) -> Exported:
     """Return the scene's MJCF with its twins; bodies are named ``<object>/<twin>``.
 
-    Raises ExportError for a twin that MJCF cannot take.
+    Raises ExportError for a twin that MJCF cannot represent.
     """
     record = scene.record
     root = new_element("mujoco", model=record.scene_id)
@@ -65,7 +65,7 @@ def _add_surroundings(asset: etree._Element, world: etree._Element, scene: Scene
             diffuse=number_text(*(min(1.0, c / 2) for c in light.color)), castshadow=str(light.casts_shadow).lower(),
         )  # fmt: skip
     for camera in record.cameras:
-        # MuJoCo's cameras look along -Z, +Y up
+        # MuJoCo's cameras look along -Z with +Y up
         right, up = camera_axes(camera.position_m, camera.target_m)
         add(
             world, "camera", name=camera.name, pos=number_text(*camera.position_m), xyaxes=number_text(*right, *up),

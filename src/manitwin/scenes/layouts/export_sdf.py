@@ -1,7 +1,7 @@
-"""A layout as an SDFormat world: every object a model with its pose, the furniture one that stands fast, meshes beside it.
+"""Export of a layout as an SDFormat world: each object a model with its pose, the furniture a static model, meshes beside it.
 
-Written after the specification (sdformat.org/spec, version 1.9). Models are in the world's own file: one that is included is
-looked for on a resource path.
+Follows the specification (sdformat.org/spec, version 1.9). Models are inline, because included models are looked up on a
+resource path.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ FURNITURE = "furniture"
 def export_sdf(scene: Scene) -> Exported:
     """Return the scene as a world with its twins' meshes; models have the names of the scene's objects.
 
-    A twin with joints is one rigid body as it stands. Raises ExportError for a twin that SDFormat cannot take.
+    An articulated twin becomes one rigid body in its present pose. Raises ExportError for a twin that SDFormat cannot
+    represent.
     """
     record = scene.record
     root = new_element("sdf", version=sdf.VERSION)

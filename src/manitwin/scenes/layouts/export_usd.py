@@ -1,4 +1,4 @@
-"""A layout as a USD folder: one stage that references every twin's own export, each beside it once.
+"""Export of a layout as a USD folder: a stage that references the exports of its twins, each stored once.
 
 Source: USD Physics schema (PhysicsScene, CollisionAPI), UsdLux DistantLight, UsdGeom Camera.
 """
@@ -21,16 +21,16 @@ from manitwin.scenes.scene import SceneCamera, SurfaceBox
 
 MAIN = "scene.usda"
 TWINS = "twins"
-APERTURE_MM = 24.0  # vertical, of a full-frame camera: with the focal length it gives the angle of view
+APERTURE_MM = 24.0  # vertical, of a full-frame camera; determines the angle of view with the focal length
 
 
 def export_usd(scene: Scene) -> Exported:
-    """Return the scene's stage with its twins beside it; a twin with joints is one rigid body as it stands.
+    """Return the scene's stage with its twins; an articulated twin becomes one rigid body in its present pose.
 
-    Raises ExportError for a twin that USD cannot take.
+    Raises ExportError for a twin that USD cannot represent.
     """
     record = scene.record
-    layer = Sdf.Layer.CreateAnonymous(".usda")  # held here: a stage's own goes with it
+    layer = Sdf.Layer.CreateAnonymous(".usda")  # kept alive here, because a stage's own layer is released with it
     stage = Usd.Stage.Open(layer)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
@@ -54,13 +54,13 @@ def export_usd(scene: Scene) -> Exported:
             known[placed.twin_id] = f"./{folder}/{exported.main}"
         prim = stage.DefinePrim(root.AppendPath(f"objects/{placed.name}"))
         references[prim.GetPath()] = known[placed.twin_id]
-        # stronger than the twin's own, whose order of operations stays
+        # overrides the twin's own values, while its order of operations stays
         prim.CreateAttribute("xformOp:translate", Sdf.ValueTypeNames.Double3, False).Set(Gf.Vec3d(*placed.position_m))
         prim.CreateAttribute("xformOp:orient", Sdf.ValueTypeNames.Quatf, False).Set(Gf.Quatf(*placed.quaternion_wxyz))
     _add_lights(stage, root, scene)
     for camera in record.cameras:
         _add_camera(stage, root, camera)
-    del stage  # it would look for the twins, which are not on disk yet
+    del stage  # it would look up the twins, which are not on disk yet
     for path, asset in references.items():
         layer.GetPrimAtPath(path).referenceList.Prepend(Sdf.Reference(asset))
     files[MAIN] = layer.ExportToString().encode()

@@ -1,4 +1,4 @@
-"""Settle a layout in simulation, measure it again, and say which objects are not where they should be."""
+"""Validation of layouts: settling in simulation, measurement, and detection of misplaced objects."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from manitwin.scenes.layouts.stacking import mouth_of
 from manitwin.scenes.scene import SceneMeasures
 from manitwin.scenes.settings import LayoutSettings
 
-LOADED_S = 1.0  # how long a scene has to stay as it is recorded after it is loaded
-GIVE_UP = 3.0  # times the limit of motion, beyond which the simulation is stopped
+LOADED_S = 1.0  # how long a scene must stay as recorded after loading
+GIVE_UP = 3.0  # multiple of the motion limit beyond which the simulation is stopped
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """A settled layout: poses by slot, the measures where it could be measured, and what is wrong with which slot."""
+    """A settled layout: poses ``(N, 4, 4)`` by slot, measures if they could be taken, and the defect of each bad slot."""
 
     object_to_world: np.ndarray
     measures: SceneMeasures | None
@@ -32,7 +32,7 @@ class Judgement:
 
 
 def judge(pool: Pool, slots: Sequence[Slot], boxes: Sequence[StaticBox], settings: LayoutSettings) -> Judgement:
-    """Let all objects come to rest together, and hold each against its limits."""
+    """Settle all objects together in simulation, and check each against its limits."""
     objects = []
     for slot in slots:
         assert slot.twin is not None and slot.put is not None
@@ -84,10 +84,10 @@ def _leaves_its_rest(
     settings: LayoutSettings,
     slots: Sequence[Slot],
 ) -> dict[int, str]:
-    """Load the scene afresh as it came to rest, and say what moves on then.
+    """Reload the settled scene, and report which objects move.
 
-    A solver knows contacts from the step before; without these, PhysX may take thin things a few millimetres apart for deep
-    in each other, and throws them (1 of 60 layouts with something in a mug).
+    A solver uses contacts of the previous step; without them, PhysX may take thin objects a few millimetres apart for deeply
+    penetrating, and ejects them (in 1 of 60 layouts with an object in a mug).
     """
     at_rest = [replace(o, object_to_world=pose) for o, pose in zip(objects, settled.object_to_world, strict=True)]
     give_up_m = [GIVE_UP * settings.max_moved_m] * len(objects)
@@ -98,7 +98,7 @@ def _leaves_its_rest(
 
 
 def _motions(objects: Sequence[PlacedObject], settled: SettledScene) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far each centre of mass moved (m) and each body turned (rad)."""
+    """Return the displacement of each centre of mass (m) and the rotation of each body (rad)."""
     moved, turned = [], []
     for placed, end in zip(objects, settled.object_to_world, strict=True):
         start, center = placed.object_to_world, placed.body.center_of_mass_m[None]
@@ -110,7 +110,7 @@ def _motions(objects: Sequence[PlacedObject], settled: SettledScene) -> tuple[np
 def _misplaced(
     pool: Pool, slots: Sequence[Slot], slot: Slot, placed: Sequence[PlacedParts], settled: SettledScene
 ) -> str | None:
-    """Say what is wrong with what holds an object: it must touch what it should, and nothing else."""
+    """Report a wrong contact or containment of an object; it must touch its parent, and nothing unrelated."""
     touched = settled.neighbours(slot.name)
     names = {each.name: each for each in slots}
     if slot.role == "stand":
@@ -144,9 +144,9 @@ def _misplaced(
 def overlaps(
     slots: Sequence[Slot], placed: Sequence[PlacedParts], boxes: Sequence[StaticBox], settled: SettledScene
 ) -> dict[int, float]:
-    """Return how deep each object is in another or in the furniture (m): the larger of what hulls and the solver say.
+    """Return the penetration (m) of each object into others or the furniture: the larger of hull overlap and solver depth.
 
-    Of two objects it is the one that was put there later.
+    For a pair of objects, it is attributed to the one that was placed later.
     """
     furniture = [ConvexParts.of_box(box).at(box.box_to_world) for box in boxes]
     depths = {
@@ -164,6 +164,6 @@ def overlaps(
 
 
 def _least_gap(slots: Sequence[Slot], placed: Sequence[PlacedParts]) -> float:
-    """Return the least distance (m) between objects that do not carry or hold each other; infinite for a single one."""
+    """Return the least distance (m) between objects that are not related by support or containment; infinite for one object."""
     every = combinations(range(len(slots)), 2)
     return least_distance([(placed[i], placed[j]) for i, j in every if not slots[i].related(slots[j])])

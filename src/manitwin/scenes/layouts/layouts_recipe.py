@@ -1,4 +1,4 @@
-"""The recipe of layouts: stages that sample a scene by its number and draw it, and the folder that they are finished in."""
+"""Recipe of layouts: stages that sample and render a scene by its number, and the writing of its folder."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ class LayoutNumber(Payload):
 
     @classmethod
     def from_json(cls, fields: Mapping[str, Any]) -> LayoutNumber:
-        """Return the number that a ledger keeps; those of earlier versions kept it as the text ``layout 17``."""
+        """Return the number stored in a ledger; earlier versions stored the text ``layout 17``."""
         return cls(int(fields["text"].split()[-1]) if "text" in fields else fields["number"])
 
 
 class LayoutStage:
-    """Sample the layout of a number, or take the scene that is there: it is never replaced, whoever made it.
+    """Sample the layout of a number, or reuse an existing scene, which is never replaced.
 
-    The twins may be others by now, or this stage; tasks and episodes name the scene by its id.
+    Twins or this stage may have changed since, but tasks and episodes refer to the scene by its id.
     """
 
     name = "layout"
@@ -70,7 +70,7 @@ class LayoutStage:
         self._out = None if out is None else DatasetRoot(out)
 
     def run(self, draft: Draft[LayoutNumber], folder: Path) -> dict[str, Any]:
-        """Write the scene; raises Rejected where none could be made, UsageError where a newer version made one."""
+        """Write the scene; raises Rejected if sampling failed, UsageError if a newer version wrote the existing one."""
         there = None if self._out is None else scene_there(self._out, draft.item_id)
         if there is not None:
             (folder / SCENE).write_bytes(there)
@@ -81,7 +81,7 @@ class LayoutStage:
 
 
 class ScenePicturesStage:
-    """Draw a scene from its cameras: colours, depth, normals and instance ids."""
+    """Render a scene from its cameras: colour, depth, normals and instance ids."""
 
     name = "pictures"
     version = "6"
@@ -105,7 +105,7 @@ class ScenePicturesStage:
 
 
 class LayoutRecord(FolderRecord):
-    """``layout.json``: how the sampling of a layout ended; ``reason`` is that of a rejection."""
+    """``layout.json``: the outcome of sampling a layout; ``reason`` is that of a rejection."""
 
     schema_version: int
     scene_id: str
@@ -115,7 +115,7 @@ class LayoutRecord(FolderRecord):
 
 @dataclass(frozen=True)
 class LayoutsRecipe(FolderRecipe[LayoutRecord]):
-    """Layouts of the twins of ``dataset``, one for each number; scenes that are below ``out`` already are taken as they are."""
+    """Layouts of twins from ``dataset``, one for each number; existing scenes below ``out`` are reused."""
 
     payload = LayoutNumber
     record = LAYOUT_RECORD
@@ -128,13 +128,13 @@ class LayoutsRecipe(FolderRecipe[LayoutRecord]):
 
     @cached_property
     def sha256(self) -> str:
-        """The digest of what decides a layout, but for the twins: their revisions stand in the scene's record."""
+        """Digest of what determines a layout, except the twins, whose revisions are in the scene's record."""
         decides = self.config.model_dump(mode="json", exclude={"run"})
         return sha256_of_json([decides, LayoutStage.version, ScenePicturesStage.version])
 
     @property
     def seed(self) -> int:
-        """The seed of everything random."""
+        """The random seed."""
         return self.config.seed
 
     def folder_of(self, item_id: str) -> str:
@@ -146,7 +146,7 @@ class LayoutsRecipe(FolderRecipe[LayoutRecord]):
         return Identity(f"layout_{self.seed}_{payload.number:06d}", "layout")
 
     def stages(self, kind: str) -> list[Stage]:
-        """Return the sampling, and the drawing where pictures are wanted."""
+        """Return the sampling stage, and the rendering stage if pictures are requested."""
         stages: list[Stage] = [LayoutStage(self.config.layout, self.dataset, self.out)]
         if self.config.pictures:
             stages.append(ScenePicturesStage(self.config, self.dataset))
@@ -155,7 +155,7 @@ class LayoutsRecipe(FolderRecipe[LayoutRecord]):
     def write(
         self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
     ) -> LayoutRecord:
-        """Write the layout's folder: its scene, and its pictures where there are any; nothing of one that was rejected."""
+        """Write the layout's folder: its scene, and its pictures if there are any; nothing for a rejected one."""
         detail, scene_bytes = "" if rejected is None else rejected.detail, b""
         if rejected is None:
             scene_bytes = draft.path(SCENE).read_bytes()
@@ -173,5 +173,5 @@ class LayoutsRecipe(FolderRecipe[LayoutRecord]):
         return self.seal(fresh, said, decided_by=scene_bytes.decode())
 
     def ending(self, record: LayoutRecord) -> Ending:
-        """Return how a layout's record says that it ended."""
+        """Return the outcome stated in a layout's record."""
         return Ending("rejected" if record.reason else "accepted", record.revision, record.reason, record.detail)

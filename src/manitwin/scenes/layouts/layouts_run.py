@@ -1,4 +1,4 @@
-"""Make many layouts: the engine's run, and its totals."""
+"""Generation of many layouts by the engine, and totals over a run."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ DECIDE_NO_SCENE = frozenset(("dataset", "run", "pictures", "picture_px"))
 
 @dataclass(frozen=True)
 class LayoutTotals:
-    """Totals of all layouts below a root; the most of each measure is over the accepted ones."""
+    """Totals of all layouts below a root; maxima of the measures are over accepted layouts."""
 
     accepted: int
     rejected: dict[str, int]
@@ -45,7 +45,7 @@ class LayoutTotals:
 
     @property
     def acceptance(self) -> float:
-        """The accepted share of those that ended."""
+        """The share of accepted layouts among completed ones."""
         return self.accepted / max(1, self.accepted + sum(self.rejected.values()))
 
 
@@ -56,12 +56,11 @@ def make_layouts(
     config: LayoutsConfig,
     **run: Unpack[RunOptions],
 ) -> RunReport:
-    """Sample the layouts number 0 to ``count - 1`` of a data set's twins below ``out``; those that are there stay.
+    """Sample the layouts number 0 to ``count - 1`` of a data set's twins below ``out``; existing ones are kept.
 
-    Scenes that were drawn by an earlier run stay so: ``pictures`` is kept. A contact sheet is removed before scenes are made,
-    which it would not show.
-    Raises UsageError for a data set without twins, categories that it has not, things that can hold or carry nothing, scenes of
-    other settings at ``out``, or where another run is at work there.
+    If an earlier run rendered scenes, ``pictures`` stays enabled. An outdated contact sheet is removed before new scenes are
+    made. Raises UsageError for a data set without twins, unavailable categories, a lack of containers or supporting objects,
+    scenes with other settings at ``out``, or another run in progress there.
     """
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} layouts; ask for 1 or more, at most {LARGEST_COUNT}")
@@ -90,13 +89,13 @@ def make_layouts(
 
 
 def _stale_scenes(root: DatasetRoot, pool: Pool) -> list[str]:
-    """Return remarks on the scenes that are there already and whose twins stand otherwise now: they stay as they are."""
+    """Return remarks on existing scenes whose twins rest differently now; the scenes are kept."""
     if not local_ledger(root).is_file():
         return []
 
     def there() -> Iterator[SceneRecord]:
         for scene_id in accepted_scenes(root.url):
-            with suppress(UsageError):  # of a newer version: the run says so
+            with suppress(UsageError):  # of a newer version, which the run reports
                 if (content := scene_there(root, scene_id)) is not None:
                     yield parse_scene(content)
 
@@ -114,7 +113,7 @@ def _stale_scenes(root: DatasetRoot, pool: Pool) -> list[str]:
 
 
 def _with_pictures_there(config: LayoutsConfig, before: dict[str, Any], place: str) -> LayoutsConfig:
-    """Return a configuration that draws scenes where an earlier run did: those that it drew are not made without pictures."""
+    """Return a configuration that renders scenes if an earlier run did, so that its pictures are not lost."""
     if config.pictures or not before.get("pictures"):
         return config
     drawn = {"pictures": True, "picture_px": before.get("picture_px", config.picture_px)}
@@ -127,12 +126,12 @@ def _with_pictures_there(config: LayoutsConfig, before: dict[str, Any], place: s
 
 
 def without_upright(dataset: str | Path) -> tuple[str, ...]:
-    """Return the ids of a data set's twins that ``upright`` layouts hold as they rest: none of their placements is upright."""
+    """Return the ids of a data set's twins that have no upright placement; ``upright`` layouts place them as they rest."""
     return tuple(twin.twin_id for twin in pool_of(DatasetRoot(dataset).absolute()).twins if not twin.stands)
 
 
 def accepted_scenes(out: str | Path) -> list[str]:
-    """Return the ids of the accepted scenes of a run in the order of their numbers."""
+    """Return the ids of a run's accepted scenes in the order of their numbers."""
     with read_ledger(local_ledger(DatasetRoot(out))) as ledger:
         return [row[0] for row in ledger.execute("SELECT twin_id FROM items WHERE state = 'accepted' ORDER BY number")]
 
@@ -146,7 +145,7 @@ def _scene(root: DatasetRoot, scene_id: str) -> SceneRecord:
 
 
 def layout_totals(out: str | Path) -> LayoutTotals:
-    """Add up what the ledger and the scenes say."""
+    """Compute the totals from the ledger and the scenes."""
     root = DatasetRoot(out)
     with read_ledger(local_ledger(root)) as ledger:
         rows = ledger.execute(

@@ -1,4 +1,4 @@
-"""Place an object on a surface: a patch as dense as the clutter level asks, circles first, then true distances of hulls."""
+"""Placement of objects on a surface: positions in a patch with the density of the clutter level, checked by hull distances."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ from manitwin.scenes.layouts.slots import Put
 from manitwin.scenes.scene import SupportRegion
 from manitwin.scenes.settings import LayoutSettings
 
-GROWTH = 1.25  # of a patch's radius when there is no room left in it
+GROWTH = 1.25  # of a patch's radius when it has no room left
 
-GROW_AFTER = 20  # places tried in vain in one patch
+GROW_AFTER = 20  # failed positions in one patch
 
 
 @dataclass(frozen=True)
 class Clutter:
-    """A level: the share of its patch that the objects' collision circles cover, and the least gap between hulls.
+    """A clutter level: the share of the patch covered by the objects' collision circles, and the least gap between hulls.
 
-    Circles of things that lie overlap without their hulls touching: a share above what discs can cover is not absurd.
+    Collision circles of lying objects may overlap without contact of their hulls, so that the share may exceed what discs can
+    cover.
     """
 
     coverage: float
@@ -37,14 +38,14 @@ LEVELS = {"sparse": Clutter(0.12, 0.03), "medium": Clutter(0.3, 0.01), "dense": 
 
 
 def clutter_of(settings: LayoutSettings) -> Clutter:
-    """Return the level of the settings, with their own gap where they name one."""
+    """Return the clutter level of the settings, with their own gap if they state one."""
     level = LEVELS[settings.clutter]
     return level if settings.min_gap_m is None else Clutter(level.coverage, settings.min_gap_m)
 
 
 @dataclass
 class Patch:
-    """A disc on a support, from which positions are drawn; the disc grows when there is no room left in it."""
+    """A disc on a support from which positions are drawn; it grows when there is no room left."""
 
     support: SupportRegion
     workspace: Workspace | None
@@ -60,14 +61,14 @@ class Patch:
         level: Clutter,
         rng: np.random.Generator,
     ) -> Patch | None:
-        """Return a patch for objects of these radii; None where the workspace has nothing of the support."""
+        """Return a patch for objects with these radii; None if the workspace does not contain any of the support."""
         area = sum(np.pi * radius**2 for radius in radii_m) / level.coverage
         patch = cls(support, workspace, np.array(support.center_m), float("inf"))
         center = patch.position(rng)
         return None if center is None else cls(support, workspace, center, float(np.sqrt(area / np.pi)))
 
     def position(self, rng: np.random.Generator, tries: int = 200) -> np.ndarray | None:
-        """Draw a position ``(2,)`` on the support, in the disc and the workspace; None where none is found."""
+        """Draw a position ``(2,)`` on the support, in the disc and the workspace; None if none is found."""
         center, half = np.array(self.support.center_m), np.array(self.support.half_extents_m)
         low, high = (
             np.maximum(center - half, self.center_m - self.radius_m),
@@ -79,12 +80,12 @@ class Patch:
         return drawn[int(fine.argmax())] if fine.any() else None
 
     def grow(self) -> None:
-        """Take in more of the support."""
+        """Enlarge the disc."""
         self.radius_m *= GROWTH
 
 
 def in_workspace(points: np.ndarray, workspace: Workspace | None) -> np.ndarray:
-    """Tell which points ``(N, 2)`` a robot at the origin reaches from above; all where there is no robot."""
+    """Return which points ``(N, 2)`` a robot at the origin reaches from above; all without a workspace."""
     if workspace is None:
         return np.ones(len(points), dtype=bool)
     radius, angle = np.linalg.norm(points, axis=1), np.abs(np.arctan2(points[:, 1], points[:, 0]))
@@ -96,7 +97,7 @@ def in_workspace(points: np.ndarray, workspace: Workspace | None) -> np.ndarray:
 def workspace_of(settings: LayoutSettings) -> Workspace | None:
     """Return the workspace of the settings: its numbers, else that of the named robot.
 
-    Raises UsageError for an unknown robot, Unavailable where it needs what ``manitwin[robots]`` installs.
+    Raises UsageError for an unknown robot, Unavailable if it needs the packages of ``manitwin[robots]``.
     """
     if settings.workspace is not None:
         near, far, half_deg = settings.workspace
@@ -116,11 +117,11 @@ class Obstacles:
         self.objects = list(objects)
 
     def above(self, height_m: float) -> list[PlacedParts]:
-        """Return the objects and the boxes that reach above a height."""
+        """Return the objects, and the boxes that reach above a height."""
         return [box for box in self.boxes if box.bounds[1][2] > height_m + 1e-6] + self.objects
 
     def is_clear(self, parts: PlacedParts, height_m: float, gap_m: float) -> bool:
-        """Tell whether nothing above the height is nearer than the gap."""
+        """Return whether every obstacle above the height is at least the gap away."""
         return is_clear_of(parts, self.above(height_m), gap_m)
 
 
@@ -135,9 +136,9 @@ def put_on_surface(
     body: PoolBody, poses: Sequence[StandingPose], patch: Patch, obstacles: Obstacles, *, gap_m: float, tries: int,
     rng: np.random.Generator,
 ) -> Put | None:  # fmt: skip
-    """Return where a twin has room in a patch in one of these placements, or None after so many places.
+    """Return a free pose of a twin in a patch, in one of these placements, or None after ``tries`` positions.
 
-    The centre of its circle is drawn in the patch, its heading is uniform. Its hulls stay within the support.
+    The centre of its collision circle is drawn in the patch, its heading uniformly. Its hulls stay within the support.
     """
     for number in range(tries):
         if number % GROW_AFTER == GROW_AFTER - 1:
@@ -155,7 +156,7 @@ def put_on_surface(
 
 
 def on_plane(pose: StandingPose, position_m: np.ndarray, height_m: float, heading_rad: float) -> np.ndarray:
-    """Return ``object_to_world`` of a placement on the plane at a height, its circle's centre at a position ``(2,)``."""
+    """Return ``object_to_world`` of a placement on the plane at a height, with its circle's centre at a position ``(2,)``."""
     turn = Rotation.from_rotvec([0, 0, heading_rad]).as_matrix()
     plane_to_world = transform(turn, np.array([*position_m, height_m]))
     result: np.ndarray = plane_to_world @ pose.object_to_plane
@@ -163,7 +164,7 @@ def on_plane(pose: StandingPose, position_m: np.ndarray, height_m: float, headin
 
 
 def is_within(parts: PlacedParts, support: SupportRegion) -> bool:
-    """Tell whether a body's projection lies on a support."""
+    """Return whether a body's projection lies on a support."""
     low, high = parts.bounds
     center, half = np.array(support.center_m), np.array(support.half_extents_m)
     return bool((low[:2] >= center - half).all() and (high[:2] <= center + half).all())

@@ -1,4 +1,4 @@
-"""The pool that layouts are made of: a data set's accepted twins as a light table, their bodies read when they are drawn."""
+"""Pool of twins for layouts: a light table of a data set's accepted twins, whose bodies are read on demand."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ KEPT_BODIES = 256
 
 @dataclass(frozen=True)
 class StandingPose:
-    """A placement that stayed in simulation: its number in the twin's record, and ``object_to_plane (4, 4)``.
+    """A settled placement: its index in the twin's record, and ``object_to_plane (4, 4)``.
 
-    The plane frame's origin is the centre of the circle of ``collision_radius_m`` around the projection.
+    The origin of the plane frame is the centre of the circle of ``collision_radius_m`` around the projection.
     """
 
     placement: int
@@ -42,10 +42,10 @@ class StandingPose:
 
 @dataclass(frozen=True)
 class PoolTwin:
-    """A twin as far as drawing it needs; ``vessel``: it has an opening that its hulls keep.
+    """The data of a twin that sampling needs; ``vessel``: it has an opening that its hulls leave open.
 
-    ``frames`` are those of its functional points. ``jointed``: it has joints, though it is one rigid body in scenes.
-    ``body_sha256`` is the digest of what decides how it comes to rest, ``grippers`` has those of its grippers' files by name.
+    ``frames`` are those of its functional points. ``jointed``: it has joints, although it is one rigid body in scenes.
+    ``body_sha256`` is the digest of what determines its rest; ``grippers`` has digests of gripper files by name.
     """
 
     twin_id: str
@@ -60,18 +60,18 @@ class PoolTwin:
 
     @property
     def stands(self) -> bool:
-        """True where one of its placements is upright."""
+        """True if one of its placements is upright."""
         return any(pose.upright for pose in self.poses)
 
     def is_a(self, category: str) -> bool:
-        """Tell whether this is of a category: its own, or one with words before it (a frying pan is a pan)."""
+        """Return whether the twin is of a category, or of a compound that ends with it (a frying pan is a pan)."""
         own, wanted = self.category.casefold(), " ".join(category.casefold().split())
         return own == wanted or own.endswith(f" {wanted}")
 
 
 @dataclass(frozen=True)
 class PoolBody:
-    """A twin's data that is read once it is drawn."""
+    """The data of a twin that is read when it is drawn."""
 
     body: RigidBody
     parts: ConvexParts
@@ -85,9 +85,9 @@ class PoolBody:
 
 
 class Pool:
-    """The twins that layouts may hold. ``read_body`` gives the body of one by its id; those used last are kept.
+    """The twins that layouts may contain. ``read_body`` returns the body of a twin by its id; recently used ones are cached.
 
-    Raises UsageError where there is none.
+    Raises UsageError if there are none.
     """
 
     def __init__(
@@ -103,13 +103,13 @@ class Pool:
             raise UsageError("no accepted twin with a stable placement; build some first")
 
     def twin(self, twin_id: str) -> PoolTwin:
-        """Return a twin by its id; raises UsageError where there is none."""
+        """Return a twin by its id; raises UsageError if it does not exist."""
         if twin_id not in self._by_id:
             raise UsageError(f"no twin {twin_id!r} with a stable placement found; build it again, or give its data set")
         return self._by_id[twin_id]
 
     def find(self, twin_id: str) -> PoolTwin | None:
-        """Return a twin by its id; None where there is none."""
+        """Return a twin by its id; None if it does not exist."""
         return self._by_id.get(twin_id)
 
     @cached_property
@@ -122,20 +122,20 @@ class Pool:
         if found is None:
             body = self._read_body(twin_id)
             found = PoolBody(body, ConvexParts.of(body.hulls))
-        self._bodies[twin_id] = found  # now the last one to go
+        self._bodies[twin_id] = found  # now the most recently used
         while len(self._bodies) > KEPT_BODIES:
             del self._bodies[next(iter(self._bodies))]
         return found
 
     @property
     def about_joints(self) -> str | None:
-        """A line on the twins that have joints, which are locked in scenes and episodes; None where there are none."""
+        """A line on the twins with joints, which are locked in scenes and episodes; None if there are none."""
         jointed = sum(twin.jointed for twin in self.twins)
         return f"twins with joints, each one rigid body here as it stands: {jointed}" if jointed else None
 
     @cached_property
     def upright(self) -> Pool:
-        """The same twins, those that have upright placements with these alone; bodies are shared."""
+        """A pool of the same twins, limited to upright placements for those that have some; bodies are shared."""
         twins = (
             replace(twin, poses=tuple(pose for pose in twin.poses if pose.upright)) if twin.stands else twin
             for twin in self.twins
@@ -143,7 +143,7 @@ class Pool:
         return Pool(twins, self._read_body, self._bodies)
 
     def of_category(self, category: str) -> tuple[PoolTwin, ...]:
-        """Return the twins of a category. Raises UsageError naming those that there are, where it has none."""
+        """Return the twins of a category. Raises UsageError naming the available categories if there are none."""
         found = tuple(twin for twin in self.twins if twin.is_a(category))
         if not found:
             known = sorted({twin.category for twin in self.twins})
@@ -153,10 +153,10 @@ class Pool:
 
 
 def read_pool(dataset: str | Path, cache: Path | None = None) -> Pool:
-    """Read the records of a data set's, or a flat folder's, accepted twins that have a placement that stayed.
+    """Read the records of the accepted twins with a settled placement, in a data set or flat folder.
 
-    ``cache`` is a local folder for the twins of a data set at a URL. Raises UsageError for a place without any, TwinError for a
-    record that is none or of another schema version. A body whose record was altered is refused once it is drawn (TwinError).
+    ``cache`` is a local folder for the twins of a data set at a URL. Raises UsageError if there are none, TwinError for an
+    invalid record or one of another schema version. An altered record is refused when its body is drawn (TwinError).
     """
     source = TwinSource(dataset, cache)
     read = (_pool_twin(source.record_bytes(twin_id), f"{dataset}: {twin_id}/{RECORD}") for twin_id in source.twin_ids())
@@ -166,7 +166,7 @@ def read_pool(dataset: str | Path, cache: Path | None = None) -> Pool:
 
     def body(twin_id: str) -> RigidBody:
         twin = source.twin(twin_id)
-        # of those drawn alone: to hash the records of a hundred thousand would take minutes
+        # only for drawn twins: hashing the records of a hundred thousand would take minutes
         parse_record(twin.read_bytes(RECORD), twin.folder / RECORD, sealed=True)
         return twin.rigid_body()
 
@@ -175,7 +175,7 @@ def read_pool(dataset: str | Path, cache: Path | None = None) -> Pool:
 
 @lru_cache(maxsize=4)
 def pool_of(dataset: str, cache: str | None = None) -> Pool:
-    """Return ``read_pool`` of a place, read once a process: a data set is not expected to change while layouts are made."""
+    """Return ``read_pool`` of a path, cached in the process: data sets are not expected to change while layouts are made."""
     return read_pool(dataset, None if cache is None else Path(cache))
 
 
@@ -196,7 +196,7 @@ class _Points(BaseModel):
 
 
 class _Standing(BaseModel):
-    """What the pool wants of an accepted record: to validate all of a hundred thousand of them would take minutes."""
+    """The part of an accepted record that the pool needs: validating all of a hundred thousand records would take minutes."""
 
     twin_id: str
     revision: str

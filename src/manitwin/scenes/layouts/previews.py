@@ -1,4 +1,4 @@
-"""Pictures of layouts: each scene from its cameras (colour, depth, normals, instance ids), and one sheet of the first scenes."""
+"""Rendering of layouts from their cameras: colour, depth, normals and instance ids."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from manitwin.scenes.twin_looks import seen_shape, twin_looks
 
 WEBP_QUALITY = 90
 DEPTH_UNIT_M = 0.001
-"""Depth is written in whole millimetres, as the cameras that it stands for write it: up to 65 m in 16 bits."""
+"""Depth is written in whole millimetres as by depth cameras: up to 65 m in 16 bits."""
 
 
 def scene_pictures(
     record: SceneRecord, twin_folder: Callable[[str], Path], *, width_px: int, height_px: int
 ) -> tuple[dict[str, SceneFrame], dict[str, int]]:
-    """Draw a scene from each of its cameras; returns the frames by camera and the ids by name.
+    """Render a scene from each of its cameras; return the frames by camera and the ids by name.
 
-    Ids are those of the objects from 1 in the record's order, then those of the furniture's boxes. ``twin_folder`` finds a
-    twin's folder by its id. Raises UsageError for a scene without cameras, RendererMissing, TwinError.
+    Objects have ids from 1 in the record's order, followed by the furniture's boxes. ``twin_folder`` returns a twin's folder by
+    its id. Raises UsageError for a scene without cameras, RendererMissing, TwinError.
     """
     if not record.cameras:
         raise UsageError(f"scene {record.scene_id}: no cameras in its record; sample it again")
@@ -52,15 +52,15 @@ def scene_pictures(
 def write_previews(
     record: SceneRecord, twin_folder: Callable[[str], Path], folder: Path, *, size_px: int
 ) -> list[Path]:
-    """Write square pictures of a scene and what they mean; returns the files, sorted.
+    """Write square pictures of a scene with their metadata; return the sorted files.
 
     For each camera: ``NAME_rgb.webp``; ``NAME_depth.png`` (16 bits, millimetres along the viewing axis, 0: nothing);
-    ``NAME_normals.png`` (world frame, 8 bits: 255 (n + 1) / 2, black: nothing); ``NAME_ids.png`` (8 bits, 16 where there are
-    more than 255 things; 0: floor and backdrop); to look at, depth and ids in colours that are explained beside them:
-    ``NAME_depth_colors.png``, ``NAME_ids_colors.png``; ``NAME_parts.png``, the numbers of ``parts`` (0: none). ``pictures.json``
-    has the ids by name, their colours (RGB), the parts by number, and the cameras: ``camera_to_world`` (OpenGL axes: x right,
-    y up, looking along -z), the size, ``K`` with the upper left pixel's centre at (0.5, 0.5), and of each object what
-    ``ObjectView`` says. Raises as ``scene_pictures`` does, and TwinError.
+    ``NAME_normals.png`` (world frame, 8 bits: 255 (n + 1) / 2, black: nothing); ``NAME_ids.png`` (8 bits, 16 for more than 255
+    ids; 0: floor and backdrop); ``NAME_depth_colors.png`` and ``NAME_ids_colors.png`` for viewing, with legends;
+    ``NAME_parts.png``, the numbers of ``parts`` (0: none). ``pictures.json`` has the ids by name, their colours (RGB), the
+    parts by number, and the cameras: ``camera_to_world`` (OpenGL axes: x right, y up, looking along -z), the size, ``K`` with
+    the upper left pixel's centre at (0.5, 0.5), and the ``ObjectView`` of each object. Raises like ``scene_pictures``, and
+    TwinError.
     """
     frames, ids = scene_pictures(record, twin_folder, width_px=size_px, height_px=size_px)
     folder.mkdir(parents=True, exist_ok=True)

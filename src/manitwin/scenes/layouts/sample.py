@@ -1,4 +1,4 @@
-"""Sample a layout: draw objects, put them where they fit, settle them, and sample again those that did not stay.
+"""Sampling of a layout: draw objects, place them, settle them in simulation, and resample those that did not stay.
 
 Source: paper, "Scene Layout Generation": placements and collision radii of twins, sampled without collision.
 """
@@ -23,19 +23,22 @@ from manitwin.scenes.scene import SCENE_SCHEMA_VERSION, Furniture, SceneObject, 
 from manitwin.scenes.settings import LayoutSettings
 
 LAYOUT = "layout"
-"""The stage of rejections: ``no_room`` for objects on the surface, ``nothing_fits`` in or on what should hold it, ``unstable``:
-something would not stay however often it was sampled again."""
-TWINS_TRIED, NEEDED_TWINS_TRIED = 4, 40  # for a distractor; for what must be there
-CARRIERS_TRIED = 8  # what holds or carries others is drawn again so often where nothing fits
-PLACES_A_TWIN = 3  # shares of the places tried
-SAME_TWIN_FAILURES = 2  # after these another twin takes the place
+"""The stage of rejections.
+
+Reasons are ``no_room`` for objects on the surface, ``nothing_fits`` in or on a container or base, and ``unstable``, for objects
+that did not stay after repeated resampling.
+"""
+TWINS_TRIED, NEEDED_TWINS_TRIED = 4, 40  # for a distractor; for a required object
+CARRIERS_TRIED = 8  # how often a container or base is redrawn if nothing fits
+PLACES_A_TWIN = 3  # shares of the positions tried
+SAME_TWIN_FAILURES = 2  # after these another twin is drawn
 
 
 def sample_layout(pool: Pool, settings: LayoutSettings, seed: int, number: int) -> SceneRecord:
-    """Return the layout of a number: the same for the same pool, settings and seed, whatever was sampled before.
+    """Return the layout of a number, determined by pool, settings and seed alone.
 
-    Every object is at the pose in which it came to rest in simulation. Raises Rejected (stage ``layout``) for one that could
-    not be made, UsageError for settings that the pool cannot satisfy, Unavailable for a robot without ``manitwin[robots]``.
+    Every object has the pose in which it came to rest in simulation. Raises Rejected (stage ``layout``) if no layout was found,
+    UsageError for settings that the pool cannot satisfy, Unavailable for a robot without ``manitwin[robots]``.
     """
     rng = np.random.default_rng([seed, number])
     pool = pool.upright if settings.upright else pool
@@ -76,7 +79,7 @@ def sample_layout(pool: Pool, settings: LayoutSettings, seed: int, number: int) 
 
 
 class _Making:
-    """A layout while it is being made."""
+    """A layout during sampling."""
 
     def __init__(self, pool: Pool, settings: LayoutSettings, furniture: Furniture, rng: np.random.Generator):
         self.pool, self.settings, self.rng = pool, settings, rng
@@ -100,9 +103,9 @@ class _Making:
         return judge(self.pool, self.slots, self.boxes, self.settings)
 
     def place(self, slots: list[Slot]) -> None:
-        """Put these slots' objects somewhere, large ones and what carries others first; one that has no room is left out.
+        """Place the objects of slots, large ones and bases first; one without room is left out.
 
-        Raises Rejected where the layout would lack what was asked for.
+        Raises Rejected if the layout would lack a required object.
         """
         for slot in slots:
             slot.put = None
@@ -121,7 +124,7 @@ class _Making:
                 self._leave_out(slot)
 
     def repair(self, wrong: dict[int, str]) -> None:
-        """Sample again what is wrong, and what stands on it or lies in it."""
+        """Resample wrong objects, and those on or in them."""
         again = [slot for slot in self.slots if slot.number in wrong]
         for slot in again:
             slot.failures += 1
@@ -194,14 +197,14 @@ class _Making:
 
 
 def _poses(slot: Slot, twin: PoolTwin, body: PoolBody) -> Sequence[StandingPose]:
-    """Return the placements that a slot allows: any, or those in which it can hold or carry something."""
+    """Return the placements that a slot allows: any, or those in which it can hold or support something."""
     if slot.vessel:
         return open_poses(twin, body)
     return level_poses(twin, body) if slot.base else twin.poses
 
 
 def _extent(pool: Pool, slots: list[Slot], judgement: Judgement) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lower and the upper corner ``(3,)`` of the box of all objects in the world."""
+    """Return the lower and upper corner ``(3,)`` of the bounding box of all objects in the world."""
     points = np.concatenate(
         [
             transform_points(pose, np.concatenate(pool.body(slot.twin.twin_id).body.hulls))
@@ -213,7 +216,7 @@ def _extent(pool: Pool, slots: list[Slot], judgement: Judgement) -> tuple[np.nda
 
 
 def _radius(slot: Slot) -> float:
-    """Return the mean radius of a twin's placements, by their probability."""
+    """Return the mean collision radius of a twin's placements, weighted by probability."""
     assert slot.twin is not None
     weights = [pose.probability + 1e-6 for pose in slot.twin.poses]
     return float(np.average([pose.collision_radius_m for pose in slot.twin.poses], weights=weights))

@@ -1,4 +1,4 @@
-"""A picture of the first scenes of a run of layouts, side by side."""
+"""Contact sheet of the first scenes of a run of layouts."""
 
 from __future__ import annotations
 
@@ -26,10 +26,9 @@ SHEET_QUALITY = 85
 
 
 def write_contact_sheet(dataset: str | Path, out: str | Path, *, most: int = SCENES_SHOWN) -> int:
-    """Write ``contact_sheet.webp`` of the first scenes of a run at ``out``; returns how many it shows.
+    """Write ``contact_sheet.webp`` with the first scenes of a run at ``out``; return the number of scenes shown.
 
-    A scene whose pictures were made already is not drawn again. Raises UsageError for a run without an accepted scene,
-    RendererMissing.
+    Existing pictures of scenes are reused. Raises UsageError for a run without an accepted scene, RendererMissing.
     """
     root, source = DatasetRoot(out), TwinSource(dataset)
     shown = accepted_scenes(out)[:most]
@@ -43,7 +42,7 @@ def write_contact_sheet(dataset: str | Path, out: str | Path, *, most: int = SCE
 
 
 def _read_picture(root: DatasetRoot, name: str) -> np.ndarray:
-    """Return a picture of a scene, ``(H, W, 3) uint8``; raises UsageError for one that cannot be read."""
+    """Return a picture of a scene, ``(H, W, 3) uint8``; raises UsageError if it is unreadable."""
     with TemporaryDirectory() as scratch:
         copy = Path(scratch) / PurePosixPath(name).name
         copy.write_bytes(root.read_bytes(name, UsageError))

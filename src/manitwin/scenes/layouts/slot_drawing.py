@@ -1,4 +1,4 @@
-"""Draw the places of a layout: how many there are, which of them hold or carry others, and their twins."""
+"""Drawing of the slots of a layout: their number, which of them are containers or bases, and their twins."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from manitwin.scenes.settings import LayoutSettings
 
 
 def draw_slots(pool: Pool, settings: LayoutSettings, rng: np.random.Generator) -> list[Slot]:
-    """Return the slots of a layout, those that carry others first, with their twins but for what is stacked or contained.
+    """Return the slots of a layout, parents first, with twins except for stacked or contained objects.
 
-    Raises UsageError for a category that the pool has not, or where nothing in it is a vessel, or nothing that is asked for
-    can carry what is stacked and there is room for nothing else.
+    Raises UsageError for a category that the pool lacks, if the pool has no container, or if no required object can support the
+    stacked ones and there is no room for another.
     """
     least, high = least_objects(pool, settings), settings.objects[1]
     count = int(rng.integers(max(settings.objects[0], least), high + 1))
@@ -34,9 +34,9 @@ def draw_slots(pool: Pool, settings: LayoutSettings, rng: np.random.Generator) -
 
 
 def least_objects(pool: Pool, settings: LayoutSettings) -> int:
-    """Return the least number of objects: one more than is asked for where none of that can carry what is stacked.
+    """Return the least number of objects: one more than requested if none of the required ones can support the stacked ones.
 
-    Raises UsageError as ``draw_slots`` does.
+    Raises UsageError like ``draw_slots``.
     """
     for category in settings.include:
         pool.of_category(category)
@@ -54,12 +54,12 @@ def least_objects(pool: Pool, settings: LayoutSettings) -> int:
 
 
 def _can_carry(pool: Pool, category: str) -> bool:
-    """Tell whether something can stand on a twin of a category, in one of its placements."""
+    """Return whether an object can stand on a twin of a category, in one of its placements."""
     return any(level_poses(twin, pool.body(twin.twin_id)) for twin in pool.of_category(category))
 
 
 def _carriers(pool: Pool, slots: list[Slot], settings: LayoutSettings) -> dict[Role, list[Slot]]:
-    """Choose which slots hold and which carry others: what was asked for by name first, where it can."""
+    """Choose the slots that are containers and bases, preferring required categories that are suitable."""
     holding: list[Slot] = []
     if settings.contained:
         named = [s for s in slots if s.category and any(t.vessel for t in pool.of_category(s.category))]

@@ -1,4 +1,4 @@
-"""The places of a layout while it is being made: who should be there, and where it was put."""
+"""Slots of a layout during sampling: the requirements of an object, its twin and its pose."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Role = Literal["stand", "on", "in"]
 
 @dataclass(frozen=True)
 class Put:
-    """An object's place: the support's name, the placement it is in, its pose and its parts there."""
+    """An object's position: the support's name, its placement, and its parts at its pose."""
 
     surface: str
     placement: int | None
@@ -30,10 +30,10 @@ class Put:
 
 @dataclass
 class Slot:
-    """A place for one object.
+    """A slot for one object.
 
-    ``role``: it stands on the furniture, on another slot or in it (``parent``). ``category`` is asked for, None for a
-    distractor; ``vessel``: something will lie in it, ``base``: something will stand on it.
+    ``role``: it stands on the furniture, or on or in another slot (``parent``). ``category`` is required, None for a
+    distractor. ``vessel``: something will lie in it; ``base``: something will stand on it.
     """
 
     number: int
@@ -53,11 +53,11 @@ class Slot:
 
     @property
     def needed(self) -> bool:
-        """True where the layout would not be what was asked for without it."""
+        """True if the layout would not meet the request without it."""
         return self.category is not None or self.role != "stand" or self.vessel or self.base
 
     def related(self, other: Slot) -> bool:
-        """Tell whether one carries or holds the other, or both are in the same vessel."""
+        """Return whether one supports or contains the other, or both are in the same container."""
         same = self.role == other.role == "in" and self.parent is other.parent
         return self.parent is other or other.parent is self or same
 
@@ -65,9 +65,9 @@ class Slot:
 def draw_twin(
     pool: Pool, slot: Slot, slots: list[Slot], rng: np.random.Generator, but: frozenset[str] = frozenset()
 ) -> PoolTwin:
-    """Draw a twin for a slot, of its category; one again only when all that will do are in the layout already.
+    """Draw a twin for a slot, of its category; one already in the layout only if no other is suitable.
 
-    ``but`` are ids that were tried in vain; they come again when nothing else is left.
+    ``but`` are ids that were tried without success; they are drawn again only if no other is left.
     """
     fitting = pool.twins if slot.category is None else pool.of_category(slot.category)
     if slot.vessel:

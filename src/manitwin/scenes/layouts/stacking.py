@@ -1,4 +1,4 @@
-"""Put one object on another or into it: lowered from above until it nearly touches; physics has the last word."""
+"""Stacking and containment: an object is lowered onto or into another until near contact, and then settled by physics."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from manitwin.scenes.layouts.placing import draw_pose, on_plane
 from manitwin.scenes.layouts.pool import PoolBody, PoolTwin, StandingPose
 from manitwin.scenes.layouts.slots import Put
 
-ABOVE_M = 0.0005  # how near lowering comes: what is let go there does not fall far
+ABOVE_M = 0.0005  # gap at which lowering stops, so that the object falls only a little
 LOWERING_STEPS = 12
 LONGEST_STEP_M = 0.05
-LEVEL_M = 0.001  # corners within this of the highest make the top, of the lowest the foot
-STANDS_M = 0.006  # how far inside of both the centre of mass is of what is stacked
-BROAD_M = 0.02  # how far the middle of a top is from its edges, for things to stand on it
-FLAT_M = 0.003  # what is stacked stands this near to the highest point below it
+LEVEL_M = 0.001  # corners within this distance of the highest form the top, of the lowest the foot
+STANDS_M = 0.006  # how far the centre of mass of a stacked object is inside both polygons
+BROAD_M = 0.02  # least distance of the middle of a top from its edges, for an object to stand on it
+FLAT_M = 0.003  # a stacked object stands this close to the highest point below it
 UP_RIGHT = np.cos(np.radians(12))
-LEAN_RAD = np.radians(20)  # most that a long thing is tilted when it is put into a vessel
-RIM_SLACK = 0.95  # of the rim's radius: what goes in is narrower
+LEAN_RAD = np.radians(20)  # largest tilt of a long object in a container
+RIM_SLACK = 0.95  # share of the rim's radius that an inserted object may take
 
 
 @dataclass(frozen=True)
 class Mouth:
-    """A vessel's opening in the world: the middle of its rim, the rim's radius, and how deep it is below."""
+    """A container's opening in the world: the centre of its rim, the rim's radius, and the depth below."""
 
     center_m: np.ndarray
     radius_m: float
@@ -37,7 +37,7 @@ class Mouth:
 
 
 def mouth_of(body: PoolBody, object_to_world: np.ndarray) -> Mouth | None:
-    """Return a vessel's mouth where it opens upward, else None."""
+    """Return a container's mouth if it opens upward, else None."""
     opening = body.opening
     if opening is None or float((object_to_world[:3, :3] @ opening.axis)[2]) < UP_RIGHT:
         return None
@@ -46,12 +46,12 @@ def mouth_of(body: PoolBody, object_to_world: np.ndarray) -> Mouth | None:
 
 
 def open_poses(twin: PoolTwin, body: PoolBody) -> list[StandingPose]:
-    """Return the placements of a vessel in which it opens upward."""
+    """Return the placements in which a container opens upward."""
     return [pose for pose in twin.poses if mouth_of(body, pose.object_to_plane) is not None]
 
 
 def level_poses(twin: PoolTwin, body: PoolBody) -> list[StandingPose]:
-    """Return the placements of a twin with a top that something can stand on; a vessel has only a rim."""
+    """Return the placements of a twin with a level top that can support an object; a container has only a rim."""
     if twin.vessel:
         return []
     return [pose for pose in twin.poses if _is_broad(level_end(body.parts.at(pose.object_to_plane), top=True))]
@@ -69,7 +69,7 @@ def put_into(
     obstacles: Sequence[PlacedParts],
     rng: np.random.Generator,
 ) -> Put | None:
-    """Return a twin lowered into a vessel, in one of its placements or on end; None where it is wider than the rim."""
+    """Return a twin lowered into a container, in one of its placements or on end; None if it is wider than the rim."""
     rotation = _turned(
         draw_pose(twin.poses, rng).object_to_plane[:3, :3] if rng.random() < 0.5 else _on_end(body, rng), rng
     )
@@ -97,10 +97,9 @@ def put_onto(
     obstacles: Sequence[PlacedParts],
     rng: np.random.Generator,
 ) -> Put | None:
-    """Return a twin in one of its placements on the level top of another, or None where it would not stand there.
+    """Return a twin in one of its placements on the level top of another, or None if it would not stand there.
 
-    Its centre of mass is over the top and over its own foot, by ``STANDS_M`` inside of both: then it is over the part that
-    they have in common.
+    Its centre of mass is above the top and above its own foot, by ``STANDS_M`` inside both, hence above their intersection.
     """
     pose = draw_pose(twin.poses, rng)
     top = level_end(base, top=True)
@@ -119,10 +118,10 @@ def put_onto(
 
 
 def lower(body: PoolBody, raised: np.ndarray, obstacles: Sequence[PlacedParts], floor_m: float) -> PlacedParts | None:
-    """Lower a body until something is near below it; None where it starts in something or comes below ``floor_m`` freely.
+    """Lower a body until it is close to an obstacle; None if it starts in contact or sinks below ``floor_m`` freely.
 
-    A body may sink by its distance to the nearest obstacle without touching any: conservative advancement. What is left
-    after ``LOWERING_STEPS``, it falls.
+    Conservative advancement: a body may sink by its distance to the nearest obstacle without contact. The distance left after
+    ``LOWERING_STEPS`` is a free fall.
     """
     parts = body.parts.at(raised)
     low, high = parts.bounds
@@ -143,7 +142,7 @@ def lower(body: PoolBody, raised: np.ndarray, obstacles: Sequence[PlacedParts], 
 
 @dataclass(frozen=True)
 class Level:
-    """The level end of a body seen from above: the middle of a convex polygon, and its sides' ``normals . x + offsets <= 0``."""
+    """The level end of a body as a convex polygon from above: its middle, and sides ``normals . x + offsets <= 0``."""
 
     middle_m: np.ndarray
     normals: np.ndarray
@@ -155,7 +154,7 @@ class Level:
 
 
 def level_end(parts: PlacedParts, *, top: bool, within_m: float = LEVEL_M) -> Level | None:
-    """Return a body's upper or lower end where that is level (to ``within_m``), and ``STANDS_M`` wide about its middle."""
+    """Return a body's upper or lower end if it is level (within ``within_m``) and ``2 * STANDS_M`` wide about its middle."""
     heights = parts.whole[:, 2] * (1 if top else -1)
     points = parts.whole[heights > heights.max() - within_m][:, :2]
     if len(points) < 3 or np.linalg.matrix_rank(points - points.mean(0), tol=STANDS_M) < 2:
@@ -167,7 +166,7 @@ def level_end(parts: PlacedParts, *, top: bool, within_m: float = LEVEL_M) -> Le
 
 
 def _on_end(body: PoolBody, rng: np.random.Generator) -> np.ndarray:
-    """Return a rotation that puts the body's longest axis upright, either end up, leaning a little."""
+    """Return a rotation that puts the body's longest axis upright, either end up, with a small tilt."""
     spread = np.linalg.eigh(np.cov(body.parts.whole.T))[1]
     longest = spread[:, 2] * (1 if rng.random() < 0.5 else -1)
     lean, around = LEAN_RAD * rng.random(), rng.uniform(-np.pi, np.pi)

@@ -1,4 +1,4 @@
-"""The surroundings of a layout: tables, shelves and trays with the regions where objects stand, lights, and cameras."""
+"""Surroundings of a layout: tables, shelves and trays with their support regions, lights, and cameras."""
 
 from __future__ import annotations
 
@@ -14,19 +14,22 @@ TABLE_M = 0.04
 
 _TABLE_CENTER_M, _TABLE_HALF_M = (0.4, 0.0), (0.65, 0.7)
 _ON_TABLE = SupportRegion(name="table", center_m=(0.62, 0.0), half_extents_m=(0.4, 0.67), height_m=0.0)
-"""Of the table's 1.3 m from x = -0.25, what lies 0.22 m and more in front of the origin: a robot's base stands there."""
+"""Of the 1.3 m long table, which begins at x = -0.25, the part at least 0.22 m in front of the origin, where a robot's base
+stands.
+"""
 
 _TRAY_HALF_M, _TRAY_FLOOR_M, _RIM_M, _RIM_WALL_M = (0.22, 0.32), 0.01, 0.03, 0.01
 _SHELF_HALF_M, _SHELF_RISE_M, _SHELF_BOARDS = (0.17, 0.5), 0.34, 2
 
 FOV_Y_RAD = 0.7
-SHELF_ASIDE_RAD, SHELF_ELEVATION_RAD = 0.25, 0.35  # of its overview: to the back of a shelf it is 0.75 rad at most
+# of its overview; 0.75 rad is the limit at which the back of a shelf is visible
+SHELF_ASIDE_RAD, SHELF_ELEVATION_RAD = 0.25, 0.35
 LEAST_REACH_M = 0.2
-"""A single dice is not all of a picture."""
+"""Keeps a picture from showing nothing but a single small object, such as a dice."""
 
 
 def make_furniture(kind: str, rng: np.random.Generator) -> Furniture:
-    """Return a table with its top at z = 0, or that with a tray or a shelf on it; materials and places are drawn."""
+    """Return a table with its top at z = 0, or one with a tray or shelf on it; materials and positions are drawn."""
     table = _box("table", (*_TABLE_CENTER_M, -TABLE_M / 2), (*_TABLE_HALF_M, TABLE_M / 2), _material(rng))
     if kind == "table":
         return Furniture(kind=kind, support_height_m=0.0, boxes=(table,), supports=(_ON_TABLE,))
@@ -36,7 +39,7 @@ def make_furniture(kind: str, rng: np.random.Generator) -> Furniture:
 
 
 def _tray(table: SurfaceBox, rng: np.random.Generator) -> Furniture:
-    """A tray with a rim of 3 cm above its floor."""
+    """Return a tray with a rim of 3 cm above its floor."""
     material = _material(rng)
     x, y = _rounded(rng.uniform(0.48, 0.62)), _rounded(rng.uniform(-0.15, 0.15))
     half_x, half_y = _TRAY_HALF_M
@@ -54,7 +57,7 @@ def _tray(table: SurfaceBox, rng: np.random.Generator) -> Furniture:
 
 
 def _shelf(table: SurfaceBox, rng: np.random.Generator) -> Furniture:
-    """Two boards between two sides, a back behind them; open to the front, where a robot is, and above."""
+    """Return two boards between two sides with a back; open at the top and at the front, where the robot is."""
     material = _material(rng)
     x = _rounded(rng.uniform(0.55, 0.65))
     half_x, half_y = _SHELF_HALF_M
@@ -97,7 +100,7 @@ def _rounded(value: float) -> float:
 
 
 def make_lights(rng: np.random.Generator) -> tuple[tuple[float, float, float], tuple[Light, ...]]:
-    """Return the ambient light and one to three directional lights from above; the first, strongest one casts shadows."""
+    """Return the ambient light and one to three directional lights from above; the first and strongest casts shadows."""
     count = int(rng.integers(1, 4))
     ambient = tuple(round(float(v), 4) for v in np.full(3, rng.uniform(0.25, 0.45)))
     lights = []
@@ -112,10 +115,10 @@ def make_lights(rng: np.random.Generator) -> tuple[tuple[float, float, float], t
 
 
 def make_cameras(kind: str, low_m: np.ndarray, high_m: np.ndarray, rng: np.random.Generator) -> tuple[SceneCamera, ...]:
-    """Return ``front`` (from beyond the table, towards the robot's place), ``oblique`` and ``overview`` (from above).
+    """Return ``front`` (from beyond the table, towards the robot), ``oblique`` and ``overview`` (from above).
 
-    Each sees all of the box of the objects, from ``low_m (3,)`` to ``high_m (3,)``. All look at a shelf from its open side, and
-    ``overview`` from so low that no board hides what stands below it.
+    Each sees the whole bounding box of the objects, from ``low_m (3,)`` to ``high_m (3,)``. All look at a shelf from its open
+    side, and ``overview`` from so low that no board hides the objects below it.
     """
     target = (low_m + high_m) / 2
     reach = max(float(np.linalg.norm(high_m - low_m)) / 2, LEAST_REACH_M)
@@ -135,7 +138,7 @@ def make_cameras(kind: str, low_m: np.ndarray, high_m: np.ndarray, rng: np.rando
 
 
 def camera_axes(position_m: Sequence[float], target_m: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the directions ``(3,)`` to the right and upward of a picture that looks from a position at a target."""
+    """Return the right and up directions ``(3,)`` of a picture that looks from a position at a target."""
     forward = np.subtract(target_m, position_m)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)

@@ -1,4 +1,4 @@
-"""The functional frames of a twin as skills take them: labelled poses in the object frame."""
+"""Functional frames of a twin for skills: labelled poses in the object frame."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ class TwinFrame:
 
 
 class LabelledPoint(BaseModel):
-    """What of a functional point is read for a pool."""
+    """The fields of a functional point that a pool reads."""
 
     label: str
     frame: FunctionalFrame | None = None
 
 
 def twin_frames(points: Iterable[LabelledPoint]) -> tuple[TwinFrame, ...]:
-    """Return the frames of those points that have one, in their order."""
+    """Return the frames of the points that have one, in order."""
     return tuple(
         TwinFrame(
             point.label,

@@ -1,1 +1,1 @@
-"""Where a twin is in a new view: its 6D pose from depth, refused where the twin does not explain what is seen."""
+"""Localization of twins in camera views: 6D pose from depth, with rejection if the twin does not explain the view."""

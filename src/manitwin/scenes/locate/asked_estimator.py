@@ -1,4 +1,4 @@
-"""Have an estimator of the user's guess the poses of a thing in a view."""
+"""Requests to a user's own pose estimator for an object in a view."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.twin.loaded_twin import Twin
 
 MOST_NUMBER = 65535
-"""The largest value of a picture of 16 bits."""
+"""The largest value of a 16-bit picture."""
 UNITS_M = (0.0001, 0.001, 0.01)
-"""Units of depth pictures, the finest first: the first one in which all depths fit into 16 bits is taken."""
+"""Units of depth pictures, finest first; the first one in which all depths fit into 16 bits is used."""
 MESH, VISUAL, DEPTH, MASK, RGB = "model.ply", "visual.glb", "depth.png", "mask.png", "rgb.png"
 
 
 class AskedEstimator:
-    """Asks an estimator about twins in a view; ``model`` is what answered last."""
+    """Queries an estimator about twins in a view; ``model`` is the one that answered last."""
 
     def __init__(self, estimator: PoseEstimator, twin: Callable[[str], Twin], seed: int):
-        """Take the estimator, what returns a twin by its id, and the seed that it is told."""
+        """Store the estimator, a function that returns a twin by id, and the seed for requests."""
         self._estimator, self._twin, self._seed = estimator, twin, seed
         self.model: str | None = None
 
     def __call__(self, view: DepthView, mask: np.ndarray, model: PoseModel) -> np.ndarray:
-        """Return its guesses ``object_to_camera (K, 4, 4)``; raises a BackendError where it does not answer as it has to."""
+        """Return its guesses ``object_to_camera (K, 4, 4)``; raises a BackendError for an invalid answer."""
         found = self._estimator.guess(pose_request(view, mask, model, self._twin(model.twin_id), self._seed))
         self.model = found.model
         return found.poses
 
 
 def pose_request(view: DepthView, mask: np.ndarray, model: PoseModel, twin: Twin, seed: int) -> PoseRequest:
-    """Return the question for the pose of the twin that ``mask (H, W) bool`` shows.
+    """Return the request for the pose of the twin that ``mask (H, W) bool`` shows.
 
-    Raises UsageError for depths that no picture of 16 bits holds.
+    Raises UsageError for depths that exceed a 16-bit picture.
     """
     depth = np.where(known_depth(view), view.depth_m, 0.0)
     unit_m = next((each for each in UNITS_M if depth.max() / each < MOST_NUMBER), None)

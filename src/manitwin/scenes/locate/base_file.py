@@ -1,4 +1,4 @@
-"""The JSON file that says where a camera is in the frame of a robot's base: what a hand-eye calibration gives."""
+"""Reader of the JSON file of a hand-eye calibration: the camera's pose in the frame of a robot's base."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ REMEDY = (
 )
 _MOST_M = 100.0
 _OFF = 1e-3
-"""Calibrations are written with four digits and more."""
+"""Calibrations are written with at least four digits."""
 
 
 def read_base(path: Path) -> np.ndarray:
-    """Return ``camera_to_base (4, 4)``, m, of a calibration's file; raises UsageError for what is no pose."""
+    """Return ``camera_to_base (4, 4)``, m, from a calibration file; raises UsageError for an invalid pose."""
     told = read_json_object(path, UsageError, limit_bytes=MAX_BASE_BYTES, name=str(path), remedy=REMEDY)
     try:
         if "camera_to_base" in told:

@@ -1,4 +1,4 @@
-"""The JSON file that says how a depth camera sees: its intrinsics, its picture's size, and the unit of its depths."""
+"""Reader of the JSON file of a depth camera: intrinsics, picture size, and depth unit."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ REMEDY = (
 )
 MAX_CAMERA_BYTES = 1 << 20
 _LEAST_BOP_SCALE = 0.02
-"""BOP's ``depth_scale`` is millimetres a unit (0.1 and 1 are usual), librealsense's is metres a unit (0.001 and less)."""
+"""BOP's ``depth_scale`` is in millimetres per unit (0.1 and 1 are common), librealsense's in metres per unit (at most 0.001)."""
 _PRINCIPAL = (("cx", "cy"), ("ppx", "ppy"))
 
 
 @dataclass(frozen=True)
 class CameraFile:
-    """``intrinsics (3, 3)`` with the upper left pixel's centre at (0.5, 0.5); size in pixels; metres a unit of depth."""
+    """``intrinsics (3, 3)`` with the upper left pixel's centre at (0.5, 0.5); size in pixels; metres per depth unit."""
 
     intrinsics: np.ndarray
     width_px: int
@@ -32,10 +32,10 @@ class CameraFile:
 
 
 def read_camera(path: Path) -> CameraFile:
-    """Read a camera's file: BOP's ``camera.json``, what OpenCV, ROS or librealsense tell, or K itself.
+    """Read a camera file: BOP's ``camera.json``, parameters of OpenCV, ROS or librealsense, or K itself.
 
-    Centres of pixels are whole numbers, as these have it, unless ``pixel_centers_at`` is 0.5. Nothing is taken for granted that
-    the file does not say. Raises UsageError.
+    Pixel centres are at whole numbers, as in these, unless ``pixel_centers_at`` is 0.5. Missing values are not assumed. Raises
+    UsageError.
     """
     told = read_json_object(path, UsageError, limit_bytes=MAX_CAMERA_BYTES, name=str(path), remedy=REMEDY)
     intrinsics = _intrinsics(told, path)

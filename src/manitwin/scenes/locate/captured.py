@@ -1,4 +1,4 @@
-"""A folder with what a depth camera saw: what ``manitwin capture`` writes and ``manitwin locate --view`` reads."""
+"""Folder with one view of a depth camera, written by ``manitwin capture`` and read by ``manitwin locate --view``."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from manitwin.formats.output_folder import new_folder
 
 DEPTH, RGB, CAMERA, BASE = "depth.png", "rgb.png", "camera.json", "base.json"
 MOST_NUMBER = 65535
-"""The largest value of a picture of 16 bits."""
+"""The largest value of a 16-bit picture."""
 
 
 @dataclass(frozen=True)
 class Capture:
-    """``depth_m (H, W)``, 0 unknown; ``rgb (H, W, 3) uint8`` aligned with it; ``intrinsics (3, 3)`` as OpenCV counts pixels.
+    """One view: ``depth_m (H, W)``, 0 unknown; ``rgb (H, W, 3) uint8`` aligned with it; ``intrinsics (3, 3)`` as in OpenCV.
 
-    ``camera_to_base (4, 4)`` where it is known; ``masks (H, W) bool`` of things by name, where there are any; ``device``
+    ``camera_to_base (4, 4)`` is given if known. ``masks (H, W) bool`` are object masks by name, if there are any. ``device``
     names the camera.
     """
 
@@ -37,7 +37,7 @@ class Capture:
 
 
 def write_capture(out: Path, capture: Capture) -> None:
-    """Write a new folder, whole or not at all; depths beyond what 16 bits hold are unknown. Raises UsageError."""
+    """Write a new folder atomically; depths that exceed 16 bits become unknown. Raises UsageError."""
     numbers = np.rint(capture.depth_m / capture.depth_unit_m)
     numbers[~(numbers <= MOST_NUMBER)] = 0
     k, (height, width) = capture.intrinsics, capture.depth_m.shape
@@ -56,9 +56,9 @@ def write_capture(out: Path, capture: Capture) -> None:
 
 
 def capture_files(folder: Path) -> dict[str, Path]:
-    """Return the files of a folder by the options of ``manitwin locate``: depth, camera, and rgb and base where they are.
+    """Return the files of a folder by option of ``manitwin locate``: depth, camera, and rgb and base if they exist.
 
-    Raises UsageError where one that is needed is not there.
+    Raises UsageError if a required one is missing.
     """
     for name in (DEPTH, CAMERA):
         if not (folder / name).is_file():

@@ -1,4 +1,4 @@
-"""A twin's functional frames and resting poses at the pose that it was found in: what else of it is known there."""
+"""Functional frames and resting poses of a twin, transformed to the pose in which it was located."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.point_records import FunctionalPoint
 
 _EDGE_PX = 7
-"""About a mask: pixels of the thing's own edge that the mask has missed are no neighbours."""
+"""Dilation of a mask in pixels, so that edge pixels of the object that the mask missed do not count as neighbours."""
 STANDS_RAD = np.deg2rad(10.0)
-"""A thing that leans by less stands in that pose."""
+"""An object that leans by less stands in that resting pose."""
 
 
 @dataclass(frozen=True)
 class CarriedFrame:
     """A functional point of a twin in the camera's frame: ``frame_to_camera (4, 4)``, m.
 
-    Z is its direction. Without a frame of its own it is the point's, +Z along the normal, and X any (``kind`` is None).
-    ``certain``: it, or another of that label, is at its place in all poses of the answer, and after all motions that leave the
-    shape where it was: depth tells no lid of a can from its base.
+    Z is its direction. If the point has no frame (``kind`` is None), +Z is along its normal, and X is arbitrary. ``certain``:
+    it, or another point of the same label, is at this position in all poses of the answer and under all symmetries of the
+    shape; depth cannot distinguish the lid of a can from its base.
     """
 
     point_id: str
@@ -41,10 +41,10 @@ class CarriedFrame:
 
 @dataclass(frozen=True)
 class CarriedPlacement:
-    """A resting pose of a twin on the observed table, where the thing is now: ``object_to_camera (4, 4)``, m.
+    """A resting pose of a twin on the observed table at the object's location: ``object_to_camera (4, 4)``, m.
 
-    Its turn about the table's normal is the nearest to how the thing lies. ``stands``: it is the one that it is in. ``free``:
-    nothing that is seen beside the thing is within the convex hull of it there.
+    Its rotation about the table's normal is the closest to the observed pose. ``stands``: it is the current resting pose.
+    ``free``: nothing visible beside the object is within its convex hull at this pose.
     """
 
     number: int
@@ -56,7 +56,7 @@ class CarriedPlacement:
 
 
 def carry_frames(thing: Thing, twin: Twin, factor: float = 1.0) -> tuple[CarriedFrame, ...]:
-    """Return a twin's functional points at its best pose, the thing being ``factor`` times its size; none if it was not found."""
+    """Return a twin's functional points at its best pose, scaled by ``factor``; empty if it was not found."""
     poses = [pose.object_to_camera for pose in thing.location.poses]
     points = twin.record.points
     if not poses or points is None or not points.functional:
@@ -82,7 +82,7 @@ def carry_frames(thing: Thing, twin: Twin, factor: float = 1.0) -> tuple[Carried
 
 
 def _own_frame(point: FunctionalPoint, factor: float) -> np.ndarray:
-    """Return a point's frame ``(4, 4)`` in the object's, the thing being ``factor`` times its size."""
+    """Return a point's frame ``(4, 4)`` in the object frame, scaled by ``factor``."""
     frame = point.frame
     if frame is None:
         own = transform(_with_z(np.array(point.normal)), np.array(point.position_m))
@@ -95,7 +95,7 @@ def _own_frame(point: FunctionalPoint, factor: float) -> np.ndarray:
 def carry_placements(
     thing: Thing, twin: Twin, view: DepthView, plane: Plane, noise_m: float
 ) -> tuple[CarriedPlacement, ...]:
-    """Return a twin's settled resting poses on the observed table, above where it lies; none where nothing was found."""
+    """Return a twin's settled resting poses on the observed table at its location; empty if it was not found."""
     poses = [pose.object_to_camera for pose in thing.location.poses]
     if not poses:
         return ()
@@ -105,7 +105,7 @@ def carry_placements(
     plane_to_camera = _with_z(up)
     own = cv2.dilate(thing.mask.astype(np.uint8), np.ones((_EDGE_PX, _EDGE_PX), np.uint8)).astype(bool)
     obstacles = seen_beside(view, own, poses[0][:3, 3])
-    obstacles = obstacles[plane.height_m(obstacles) > CLEARANCE_M + 2 * noise_m]  # the table itself bears it
+    obstacles = obstacles[plane.height_m(obstacles) > CLEARANCE_M + 2 * noise_m]  # the table supports it
     found = []
     for number, each in enumerate(twin.record.placements or []):
         if not each.settled:
@@ -127,14 +127,14 @@ def carry_placements(
 
 
 def _nearest_turn(rotation: np.ndarray) -> np.ndarray:
-    """Return the turn about Z ``(3, 3)`` that is nearest to a rotation."""
+    """Return the rotation about Z ``(3, 3)`` that is closest to a rotation."""
     angle = np.arctan2(rotation[1, 0] - rotation[0, 1], rotation[0, 0] + rotation[1, 1])
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _with_z(axis: np.ndarray) -> np.ndarray:
-    """Return a rotation ``(3, 3)`` whose Z is an axis, and whose X is square to it and to the least of its components."""
+    """Return a rotation ``(3, 3)`` with the given Z axis, and X perpendicular to it and to its smallest component."""
     z = axis / np.linalg.norm(axis)
     x = np.cross(np.eye(3)[int(np.abs(z).argmin())], z)
     x /= np.linalg.norm(x)

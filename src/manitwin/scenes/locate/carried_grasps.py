@@ -1,4 +1,4 @@
-"""A twin's verified grasps at the pose that it was found in, as far as what else is seen leaves room for the hand."""
+"""Verified grasps of a twin, transformed to its located pose and filtered by visible obstacles."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from manitwin.scenes.locate.recognition import Thing
 from manitwin.twin.loaded_twin import Grasps, Twin
 
 CLEARANCE_M = 0.004
-"""Between the hand and what is seen beside the thing, besides twice the noise."""
+"""Clearance between the hand and visible neighbours, in addition to twice the noise."""
 OPEN_M = 0.02
-"""The hand is so much wider than what it goes around, on both sides together, where it can be."""
+"""Total extra opening of the hand beyond the grasp width, where possible."""
 APPROACH_M = (0.0, 0.03, 0.06, 0.1)
-"""Back along the approach: where the hand comes from is to be free as well."""
+"""Distances back along the approach direction at which the hand must be free too."""
 ALIKE_M, ALIKE_RAD = 0.01, np.deg2rad(12)
-"""Of an ambiguous pose: a grasp counts that is so near to a verified one in each of the poses."""
+"""Tolerances for ambiguous poses: a grasp counts if it is this close to a verified one in each of the poses."""
 _AROUND_M = 0.35
 _MOST_POINTS = 6000
 _MOST_TURNS = 12
@@ -34,9 +34,9 @@ _SIGNS = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
 
 @dataclass(frozen=True)
 class CarriedGrasp:
-    """A verified grasp in the camera's frame: ``gripper_to_camera (4, 4)``, m; ``value`` (0 to 1) is how good it is thought.
+    """A verified grasp in the camera's frame: ``gripper_to_camera (4, 4)``, m; ``value`` (0 to 1) is its expected quality.
 
-    ``reached``: whether a robot's arm comes there; None: no robot was asked about.
+    ``reached``: whether a robot's arm reaches it; None if no robot was considered.
     """
 
     grasp_id: str
@@ -48,9 +48,9 @@ class CarriedGrasp:
 
 @dataclass(frozen=True)
 class CarriedGrasps:
-    """The grasps that can be used, the best first, and of how many verified ones: the others were not free, or not certain.
+    """The usable grasps, best first, and the counts of verified, obstructed and uncertain ones.
 
-    ``robot`` is the one that was asked whether it reaches them; those that it reaches come first.
+    ``robot`` is the one whose reach was tested; grasps that it reaches come first.
     """
 
     gripper: str
@@ -64,13 +64,13 @@ class CarriedGrasps:
 def carry_grasps(
     thing: Thing, twin: Twin, view: DepthView, plane: Plane, noise_m: float, grippers: Sequence[Gripper] = ()
 ) -> CarriedGrasps | None:
-    """Return a twin's verified grasps at its best pose, free of the observed table and neighbours.
+    """Return a twin's verified grasps at its best pose that are free of the observed table and neighbours.
 
-    Where the pose is ambiguous, a grasp counts that is one of the twin's in every pose. The poses that a symmetry of the shape
-    makes are tried in turn, since any of them may be the true one. The hand is tested open, where it grasps and on the last
-    10 cm before, against what is seen beside the thing and against the plane where that is hidden; what is hidden
-    otherwise, it is not tested against. ``grippers`` are those of one's own that twins were built with. None where nothing was
-    found, or the twin has no grasps of a parallel gripper.
+    If the pose is ambiguous, a grasp counts if it is one of the twin's in every pose. Poses that are equivalent by symmetry of
+    the shape are tried in turn, since any of them may be the true one. The open hand is tested at the grasp and over the last
+    10 cm of its approach, against visible neighbours and the whole plane of the table, but not against other hidden space.
+    ``grippers`` are user-defined grippers with which twins were built. None if nothing was found, or the twin has no grasps of
+    a parallel gripper.
     """
     location = thing.location
     if not location.poses or twin.record.grasps is None:
@@ -105,7 +105,7 @@ def carry_grasps(
 
 
 def _known_in(grasps: Grasps, pose: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return which grasps at one pose are also near one of the twin in another pose, ``(N,) bool``."""
+    """Return which grasps at one pose are also close to one of the twin's in another pose, ``(N,) bool``."""
     known = grasps.gripper_to_object
     if not len(known):
         return np.zeros(len(grasps), bool)
@@ -120,7 +120,7 @@ def _known_in(grasps: Grasps, pose: np.ndarray, other: np.ndarray) -> np.ndarray
 
 
 def seen_beside(view: DepthView, mask: np.ndarray, center: np.ndarray) -> np.ndarray:
-    """Return points ``(N, 3)`` of what is seen near the thing and is no part of it."""
+    """Return points ``(N, 3)`` of visible surfaces near the object that do not belong to it."""
     points = view.points(np.flatnonzero(known_depth(view) & ~mask))
     points = points[np.linalg.norm(points - center, axis=1) < _AROUND_M]
     return points[:: max(1, len(points) // _MOST_POINTS)]
@@ -129,7 +129,7 @@ def seen_beside(view: DepthView, mask: np.ndarray, center: np.ndarray) -> np.nda
 def _is_free(
     gripper_to_camera: np.ndarray, boxes: list[PlacedBox], obstacles: np.ndarray, plane: Plane, clearance_m: float
 ) -> bool:
-    """Tell whether no obstacle point is in the hand's boxes, and none of these is in the table, on the whole approach."""
+    """Return whether the hand's boxes contain no obstacle point and do not cross the table, over the whole approach."""
     local = transform_points(inverse(gripper_to_camera), obstacles)
     for box_to_gripper, half_m in boxes:
         in_box = transform_points(inverse(box_to_gripper), local)
@@ -144,6 +144,6 @@ def _is_free(
 
 
 def _value(grasps: Grasps, place: int) -> float:
-    """Return the posterior mean of the share of perturbed trials that held, where there were any, else the score."""
+    """Return the posterior mean of the success rate in perturbed trials, if there were any, else the score."""
     share, trials = (grasps.columns[name][place] for name in ("robustness", "robustness_trials"))
     return float((share * trials + 1) / (trials + 2)) if trials else float(grasps.score[place])

@@ -1,4 +1,4 @@
-"""How well a pose explains a depth picture: the object drawn by rays at that pose, against what is seen there."""
+"""Scoring of poses: depth of the object rendered at a pose compared with the observed depth."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.scenes.locate.registration import stepped
 
 NEAR_PX = 12
-"""Pixels about the mask in which most of what a wrong pose shows too much lies: they are sampled more densely."""
+"""Pixels around the mask that contain most of what a wrong pose shows in excess; they are sampled more densely."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """Sampled pixels of a picture: the first ``inside`` show the thing, the others lie about it.
+    """Sampled pixels of a picture: the first ``inside`` show the object, the others lie around it.
 
-    ``rays (N, 3)`` have unit length, ``stretch (N,)`` is length by depth; each pixel stands for ``weight (N,)`` of them.
+    ``rays (N, 3)`` have unit length, ``stretch (N,)`` is distance over depth, and ``weight (N,)`` the number of pixels that
+    each sample represents.
     """
 
     rays: np.ndarray
@@ -32,7 +33,7 @@ class Evidence:
 
     @classmethod
     def of(cls, view: DepthView, mask: np.ndarray, reach_px: float, count: int, rng: np.random.Generator) -> Evidence:
-        """Sample ``count`` pixels of the ``mask (H, W) bool`` and as many about it, up to ``reach_px`` from its box."""
+        """Sample ``count`` pixels of the ``mask (H, W) bool`` and as many around it, up to ``reach_px`` from its bounding box."""
         rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
         far = np.zeros_like(mask)
         pad = int(np.ceil(reach_px))
@@ -61,7 +62,7 @@ class Evidence:
 
 
 def drawn_depth_m(model: PoseModel, poses: np.ndarray, evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
-    """Return the depth (m; inf: nothing) and the face ``(K, N)`` that the object shows at each sampled pixel in each pose."""
+    """Return the depth (m; inf: nothing) and the face index ``(K, N)`` of the rendered object at each sample in each pose."""
     back = inverse(poses)
     directions = np.einsum("kij,nj->kni", back[:, :3, :3], evidence.rays)
     origins = np.broadcast_to(back[:, None, :3, 3], directions.shape)
@@ -71,17 +72,17 @@ def drawn_depth_m(model: PoseModel, poses: np.ndarray, evidence: Evidence) -> tu
 
 
 def explained(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float) -> np.ndarray:
-    """Return the score ``(K,)`` in 0..1 of poses: pixels explained by those that are seen or wrongly shown.
+    """Return the score ``(K,)`` in 0..1 of poses: explained pixels over the union of observed and wrongly shown ones.
 
-    It is 1 less the Visible Surface Discrepancy (Hodan et al. 2016, equation 1) with a cost that grows with the square of the
-    difference up to ``tolerance_m``; pixels in which the pose stands before what is seen about the thing count as wrongly
-    shown, those behind it as hidden.
+    It is 1 minus the Visible Surface Discrepancy (Hodan et al. 2016, equation 1) with a cost that grows quadratically with the
+    difference up to ``tolerance_m``. Pixels in which the pose is in front of the surroundings count as wrongly shown, those
+    behind them as hidden.
     """
     return scores_of(pixel_gains(model, poses, evidence, tolerance_m), evidence)
 
 
 def pixel_gains(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float) -> np.ndarray:
-    """Return what each sampled pixel says of each pose, ``(K, N)``: 0..1 is explained inside, -1 is wrongly shown outside."""
+    """Return the gain of each sampled pixel for each pose, ``(K, N)``: 0..1 is explained inside, -1 is wrongly shown outside."""
     drawn, _ = drawn_depth_m(model, poses, evidence)
     n = evidence.inside
     off = np.minimum(np.abs(drawn[:, :n] - evidence.depth_m[:n]) / tolerance_m, 1.0)
@@ -90,7 +91,7 @@ def pixel_gains(model: PoseModel, poses: np.ndarray, evidence: Evidence, toleran
 
 
 def scores_of(gains: np.ndarray, evidence: Evidence) -> np.ndarray:
-    """Return the scores ``(K,)`` of what pixels say."""
+    """Return the scores ``(K,)`` for gains."""
     n = evidence.inside
     weighted = gains * evidence.weight
     return np.asarray(weighted[:, :n].sum(1) / (evidence.weight[:n].sum() - weighted[:, n:].sum(1)))
@@ -99,10 +100,10 @@ def scores_of(gains: np.ndarray, evidence: Evidence) -> np.ndarray:
 def polished(
     model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float, iterations: int
 ) -> np.ndarray:
-    """Return ``object_to_camera (K, 4, 4)`` after point-to-plane steps on what each sampled pixel of the thing shows.
+    """Return ``object_to_camera (K, 4, 4)`` after point-to-plane steps on the samples of the object.
 
-    The pairs are the seen point and the drawn one on the same ray (Blais and Levine 1995), which never pairs the outside of a
-    thin wall with its inside. Pairs more than three tolerances apart are left out, the others weigh as Tukey's biweight has it.
+    Pairs are the observed and the rendered point on the same ray (Blais and Levine 1995), which never pairs the outside of a
+    thin wall with its inside. Pairs more than three tolerances apart are ignored; the others are weighted by Tukey's biweight.
     """
     n = evidence.inside
     rays = evidence.rays[:n] * evidence.stretch[:n, None]

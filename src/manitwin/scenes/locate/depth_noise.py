@@ -1,4 +1,4 @@
-"""A depth camera as it errs: noise that grows with the distance, edges that jitter, depths that are missing."""
+"""Noise model of a depth camera: depth noise that grows with distance, edge jitter, and missing depths."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ import numpy as np
 class DepthNoise:
     """The errors of a structured-light or time-of-flight camera.
 
-    Standard deviation ``base_m + growth_per_m * (z - nearest_m)^2`` along the viewing axis and a jitter of ``jitter_px`` across
-    it: Nguyen, Izadi and Lovell 2012 ("Modeling Kinect Sensor Noise for Improved 3D Reconstruction and Tracking", equations 3
-    and 4, rounded). ``lost_at_jumps`` of the pixels beside a jump and ``lost_anywhere`` of all have no depth.
+    The standard deviation is ``base_m + growth_per_m * (z - nearest_m)^2`` along the viewing axis, with a lateral jitter of
+    ``jitter_px``: Nguyen, Izadi and Lovell 2012 ("Modeling Kinect Sensor Noise for Improved 3D Reconstruction and Tracking",
+    equations 3 and 4, rounded). A share ``lost_at_jumps`` of the pixels beside a depth jump and ``lost_anywhere`` of all have
+    no depth.
     """
 
     base_m: float = 0.0012
@@ -31,7 +32,7 @@ class DepthNoise:
         return np.asarray(self.base_m + self.growth_per_m * np.maximum(depth_m - self.nearest_m, 0.0) ** 2)
 
     def observed(self, depth_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return true depths ``(H, W)`` (0: nothing) as the camera tells them: multiples of ``step_m``, 0 unknown."""
+        """Return true depths ``(H, W)`` (0: nothing) as the camera measures them: multiples of ``step_m``, 0 unknown."""
         height, width = depth_m.shape
         rows, columns = np.mgrid[:height, :width]
         shift = rng.normal(0.0, self.jitter_px, (2, height, width))

@@ -1,4 +1,4 @@
-"""The decision about a view: one pose, several that are equally likely, or that this twin is not what is seen."""
+"""Pose decision for a view: one pose, several equally likely ones, or rejection of the twin."""
 
 from __future__ import annotations
 
@@ -15,23 +15,25 @@ from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.scenes.locate.search import Candidates, find_candidates
 
 LEAST_SCORE = 0.8
-"""A twin that explains less is not what is seen. Set on the tuning half of ``benchmarks/locate.py``."""
+"""Least score of an accepted pose. Set on the tuning half of ``benchmarks/locate.py``."""
 AMBIGUOUS_MARGIN, AMBIGUOUS_SIGMA = 0.006, 4.5
-"""Another pose is told apart where it scores so much less, and by so many standard errors of the pixels on which the two differ:
-a knob is few pixels, and noise is never the same. Set as ``LEAST_SCORE``."""
+"""Another pose is distinguished if it scores less by this margin, and by this many standard errors over differing pixels.
+
+The latter keeps small features such as a knob, which are few pixels, apart from noise. Set like ``LEAST_SCORE``.
+"""
 DIFFERENT_SHARE = 0.1
-"""Of the diameter: poses whose points are farther apart in the mean, symmetries left out, are different (ADD's usual bar)."""
+"""Share of the diameter: poses with a larger mean point distance, up to symmetry, are different (the usual threshold of ADD)."""
 MOST_POSES = 8
 _POINTS = 80
 
 Status = Literal["found", "ambiguous", "none"]
 Guess = Callable[[DepthView, np.ndarray, PoseModel], np.ndarray]
-"""What returns poses ``(K, 4, 4)`` in which a twin may be seen where the mask is."""
+"""A function that returns poses ``(K, 4, 4)`` in which a twin may be visible at the mask."""
 
 
 @dataclass(frozen=True)
 class PoseEstimate:
-    """A pose ``object_to_camera (4, 4)``, m, its score in 0..1, and which share of the drawn object is seen in it."""
+    """A pose ``object_to_camera (4, 4)``, m, its score in 0..1, and the visible share of the rendered object."""
 
     object_to_camera: np.ndarray
     score: float
@@ -40,9 +42,10 @@ class PoseEstimate:
 
 @dataclass(frozen=True)
 class Location:
-    """What was decided of a twin in a view. ``poses``, the best first, is empty where the answer is ``none``.
+    """The decision on a twin in a view. ``poses``, best first, is empty for the answer ``none``.
 
-    ``best_score`` is that of the best pose, whether accepted or not; ``tolerance_m`` the depth difference that explains nothing.
+    ``best_score`` is that of the best pose, accepted or not; ``tolerance_m`` is the depth difference from which on a pixel is
+    unexplained.
     """
 
     twin_id: str
@@ -57,11 +60,11 @@ class Location:
 def locate_in_view(
     view: DepthView, mask: np.ndarray, model: PoseModel, *, seed: int = 0, guess: Guess | None = None
 ) -> Location:
-    """Find the pose of a twin that ``mask (H, W) bool`` shows in a view. Same input and seed, same answer.
+    """Find the pose of a twin that ``mask (H, W) bool`` shows in a view, deterministically for a seed.
 
-    Candidates of the whole sphere are aligned and drawn (``search``); the score is the share of what is seen that the drawn twin
-    explains (``comparison.explained``). ``guess`` takes the place of the search, and no other; what it says is aligned, compared
-    and refused as what is searched for. Raises UsageError for a mask that shows next to nothing at a known depth.
+    Candidates over all orientations are aligned and rendered (``search``); the score is the share of the observed pixels that
+    the rendered twin explains (``comparison.explained``). ``guess`` replaces only the starts of the search; its poses are
+    aligned, scored and rejected in the same way. Raises UsageError for a mask with hardly any known depth.
     """
     pixels = int((mask & known_depth(view)).sum())
     if pixels < LEAST_PX:
@@ -99,8 +102,8 @@ def locate_in_view(
 def pose_distances_m(model: PoseModel, poses: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return for each of ``poses (K, 4, 4)`` the mean distance (m) of its surface points from those in pose ``other (4, 4)``.
 
-    The least over the shape's symmetries: ADD of Hinterstoisser et al. 2012 with BOP's symmetries. Of a ball it is what its
-    centre has moved.
+    It is the minimum over the shape's symmetries: ADD of Hinterstoisser et al. 2012 with BOP's symmetries. For a ball, it is
+    the displacement of the centre.
     """
     if model.symmetries.ball:
         moved = poses - other
@@ -114,7 +117,7 @@ def pose_distances_m(model: PoseModel, poses: np.ndarray, other: np.ndarray) -> 
 
 
 def visible_shares(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float) -> np.ndarray:
-    """Return which share of each drawn pose is seen: the rest stands behind something nearer, ``(K,)``."""
+    """Return the visible share of each rendered pose, ``(K,)``; the rest is hidden by something nearer."""
     drawn, _ = drawn_depth_m(model, poses, evidence)
     hit = np.isfinite(drawn)
     seen = hit & (drawn < evidence.depth_m + tolerance_m)
@@ -123,10 +126,10 @@ def visible_shares(model: PoseModel, poses: np.ndarray, evidence: Evidence, tole
 
 
 def margins(found: Candidates) -> tuple[np.ndarray, np.ndarray]:
-    """Return by how much each candidate scores less than the best, and the same in standard errors of the pixels, ``(K,)``.
+    """Return by how much each candidate scores less than the best, and the same in standard errors over pixels, ``(K,)``.
 
-    Each sampled pixel counts once in the standard errors, and not for all that it stands for: the noise of each is its own, and a
-    few that stand for many far from the thing would drown what those of the thing say.
+    Each sampled pixel counts once in the standard errors rather than by its weight: noise is independent, and a few samples
+    with large weights far from the object would dominate those on the object.
     """
     less = found.gains[0] - found.gains
     spread = np.sqrt((less**2).sum(1))
@@ -134,7 +137,7 @@ def margins(found: Candidates) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _different(found: Candidates, model: PoseModel) -> list[int]:
-    """Return the places of the best candidate and of those that are different poses, and cannot be told apart from it."""
+    """Return the indices of the best candidate, and of different poses that cannot be distinguished from it."""
     less, sigma = margins(found)
     near = np.flatnonzero((less < AMBIGUOUS_MARGIN) | (sigma < AMBIGUOUS_SIGMA))
     kept: list[int] = []

@@ -1,4 +1,4 @@
-"""The pictures and clouds of a view, read without trust."""
+"""Readers of untrusted pictures and point clouds of a view."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ MAX_CLOUD_BYTES = 256 << 20
 MOST_SIDE_PX = 480
 _MOST_TANGENT = float(np.tan(np.deg2rad(89.0)))
 _PITCH_OF_SPACING = 1.6
-"""Pixels so much wider than points lie apart leave few holes in what a cloud shows."""
+"""Ratio of pixel size to point spacing that leaves few holes in the picture of a cloud."""
 _MARGIN = 0.5
-"""Of a cloud's width and height, around it: where a pose would show what was not seen."""
+"""Margin around a cloud, as share of its size, in which a pose may show what was not observed."""
 
 
 def read_view(depth: Path, camera: Path, rgb: Path | None, mask: Path | None) -> tuple[DepthView, np.ndarray | None]:
-    """Read a depth picture with its camera, its colours and the mask ``(H, W) bool`` of a thing; raises UsageError."""
+    """Read a depth picture with its camera, its colours and an object mask ``(H, W) bool``; raises UsageError."""
     said = read_camera(camera)
     numbers = _labels(depth, said, camera, "save depths as a 16-bit PNG with one channel")
     pixels = None if rgb is None else _colors(rgb, said, camera)
@@ -43,7 +43,7 @@ def read_view(depth: Path, camera: Path, rgb: Path | None, mask: Path | None) ->
 
 
 def read_cloud(path: Path) -> tuple[DepthView, np.ndarray]:
-    """Read the points of one thing, m, in the camera's frame (z ahead), as the picture that shows them; raises UsageError.
+    """Read the points of one object, m, in the camera's frame (z forward), as a depth picture; raises UsageError.
 
     ``.ply`` has x, y, z; ``.npz`` an array ``points``, ``xyz_m`` or ``xyz`` ``(N, 3)``.
     """
@@ -63,9 +63,9 @@ def read_cloud(path: Path) -> tuple[DepthView, np.ndarray]:
 
 
 def view_of_cloud(points_m: np.ndarray, name: str) -> tuple[DepthView, np.ndarray]:
-    """Return the picture that shows points ``(N, 3)`` of one thing seen from the origin along +z, and where it shows them.
+    """Return the depth picture of points ``(N, 3)`` of one object seen from the origin along +z, and its mask.
 
-    Around them nothing is seen, and nothing is known in holes between them. Raises UsageError.
+    Outside the points nothing is seen, and holes between them are unknown. Raises UsageError.
     """
     if len(points_m) < LEAST_PX:
         raise UsageError(f"{name}: {len(points_m)} points; at least {LEAST_PX} are needed")

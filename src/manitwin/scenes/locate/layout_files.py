@@ -1,4 +1,4 @@
-"""A located scene as files: what everything that plans in layouts reads, and what is told of it."""
+"""Output files of a located scene: a layout that planners read, and its description."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ KIND = "located"
 
 @dataclass(frozen=True)
 class NoLayout:
-    """Why a located view has no layout, where that is known before anything is let go."""
+    """The reason why a located view has no layout, if known before simulation."""
 
     reason: str
 
 
 def dataset_of_twin(folder: Path) -> str | None:
-    """Return the data set, or flat folder of twins, that a twin's folder lies in; None: in none, or it holds no twin."""
+    """Return the data set, or flat folder of twins, that contains a twin's folder; None if there is none."""
     place = folder.resolve()
     if not (place / RECORD).is_file():
         return None
@@ -38,7 +38,7 @@ def dataset_of_twin(folder: Path) -> str | None:
 
 
 def write_layout(folder: Path, scene: LocatedScene, dataset: str) -> None:
-    """Write ``config.json`` and the scene's file below a folder, where there is a layout."""
+    """Write ``config.json`` and the scene file below a folder, if there is a layout."""
     if scene.record is not None:
         config = {"kind": KIND, "dataset": dataset, "seed": scene.record.seed}
         (folder / CONFIG).write_text(canonical_json(config), encoding="utf-8")
@@ -46,7 +46,7 @@ def write_layout(folder: Path, scene: LocatedScene, dataset: str) -> None:
 
 
 def layout_document(scene: LocatedScene | NoLayout) -> dict[str, Any]:
-    """Return what is told of a layout, as JSON values."""
+    """Return the description of a layout as JSON values."""
     if isinstance(scene, NoLayout):
         nothing = dict.fromkeys(("base", "camera_to_world", "table", "obstacles", "left_out"))
         return {"scene": None, "reason": scene.reason, "objects": [], **nothing}

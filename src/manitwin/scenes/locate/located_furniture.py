@@ -1,4 +1,4 @@
-"""The furniture of a located scene: the table as far as it is seen, and all else on it as boxes."""
+"""Furniture of a located scene: the visible table, and boxes for all other visible obstacles on it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LEAST_HALF_M = 0.001
 
 
 def located_furniture(view: DepthView, objects: Sequence[LocatedObject], world: WorldFrame) -> tuple[Furniture, int]:
-    """Return the furniture, and how many boxes of what is seen were left out since they are in a located object."""
+    """Return the furniture, and the number of obstacle boxes that were left out because they overlap a located object."""
     noise_m = measured_noise_m(view, np.ones(view.depth_m.shape, bool))
     located = np.any([each.thing.mask for each in objects], axis=0)
     surfaces = np.concatenate([each.surface for each in objects])
@@ -58,6 +58,6 @@ def _parts_of(box: SurfaceBox) -> PlacedParts:
 
 
 def triple(values: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
-    """Return three numbers as a scene's file has them, in micrometres."""
+    """Return three numbers rounded to micrometres, as in a scene file."""
     x, y, z = (round(float(v), 6) for v in values)
     return x, y, z

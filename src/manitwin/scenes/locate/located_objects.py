@@ -1,4 +1,4 @@
-"""Located twins in the world, as upright as the placements that they are nearest to."""
+"""Located twins in the world, aligned with their closest upright placement."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from manitwin.scenes.locate.world_frame import WorldFrame
 from manitwin.twin.loaded_twin import Twin
 
 SNAP_RAD, STANDS_M = np.deg2rad(10.0), 0.015
-"""What leans by less from one of its placements stands in it; what has its lowest point so near the table stands on it."""
+"""Tolerances for standing: tilt from a placement, and distance of the lowest point from the table."""
 _SURFACE_POINTS = 1500
 
 
 @dataclass(frozen=True)
 class LocatedObject:
-    """A located twin in the world: ``seen (4, 4)`` as it was found, ``placed`` as it is let go.
+    """A located twin in the world: ``seen (4, 4)`` as it was found, ``placed`` at its start pose for settling.
 
-    ``placement`` is the number of the one that it stands in; None: in none of them.
+    ``placement`` is the index of its placement; None if it is in none.
     """
 
     placed: PlacedObject
@@ -35,18 +35,18 @@ class LocatedObject:
 
     @property
     def corners(self) -> np.ndarray:
-        """The corners ``(N, 3)`` of its hulls as it is let go."""
+        """The corners ``(N, 3)`` of its hulls at the start pose."""
         return transform_points(self.placed.object_to_world, np.concatenate(self.placed.body.hulls))
 
     @property
     def surface(self) -> np.ndarray:
-        """Points ``(N, 3)`` of its surface where it was found."""
+        """Points ``(N, 3)`` of its surface at the located pose."""
         points = self.thing.model.points
         return transform_points(self.seen, points[:: max(1, len(points) // _SURFACE_POINTS)])
 
     @cached_property
     def parts(self) -> ConvexParts:
-        """Its hulls, for distances."""
+        """Its hulls, for distance queries."""
         return ConvexParts.of(self.placed.body.hulls)
 
     def parts_at(self, object_to_world: np.ndarray) -> PlacedParts:
@@ -55,7 +55,7 @@ class LocatedObject:
 
 
 def located_objects(things: Sequence[tuple[Thing, Twin]], world: WorldFrame) -> tuple[LocatedObject, ...]:
-    """Return the found things in the world, each in its best pose; those without one are left out."""
+    """Return the located objects in the world, each in its best pose; objects without a pose are left out."""
     found: list[LocatedObject] = []
     for thing, twin in things:
         if thing.location.poses:
@@ -71,7 +71,7 @@ def located_objects(things: Sequence[tuple[Thing, Twin]], world: WorldFrame) -> 
 
 
 def _upright(seen: np.ndarray, twin: Twin, center: np.ndarray) -> tuple[np.ndarray, int | None]:
-    """Return a pose turned about the centre of mass into the placement that it is nearest to, and the number of that."""
+    """Return a pose rotated about the centre of mass into the closest placement, and the index of that placement."""
     ups = {
         number: seen[:3, :3] @ rotation_from_quaternion_wxyz(np.array(each.quaternion_wxyz))[2]
         for number, each in enumerate(twin.record.placements or [])

@@ -1,4 +1,4 @@
-"""A located view as a layout: twins where they were found, let go in physics, and all else that is seen as boxes."""
+"""Layout from a located view: twins at their located poses, settled in physics, and boxes for other visible obstacles."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record_digests import body_sha256
 
 LOCATED = "located"
-"""What ``clutter`` says of a scene that was seen and not sampled."""
-GIVE_UP = 3.0  # times the limit of motion, beyond which the simulation is stopped
+"""The ``clutter`` of a scene that was observed instead of sampled."""
+GIVE_UP = 3.0  # multiple of the motion limit beyond which the simulation is stopped
 
 
 @dataclass(frozen=True)
 class LocatedScene:
-    """The layout (None: nothing stays where it was found) with its furniture and objects.
+    """The layout (None if nothing stays where it was found) with its furniture and objects.
 
-    ``rest (N, 4, 4)`` are the objects' poses after they were let go, ``left_out`` counts the seen boxes that were in one of them.
-    ``as_boxes`` are those that do not stay, with the reason: of them the layout has what is seen, as of things that nobody knows.
+    ``rest (N, 4, 4)`` are the settled poses of the objects. ``left_out`` counts obstacle boxes that overlapped an object.
+    ``as_boxes`` are the objects that did not stay, with the reason; the layout represents them by boxes like unknown obstacles.
     """
 
     record: SceneRecord | None
@@ -45,27 +45,27 @@ class LocatedScene:
 
     @property
     def motions(self) -> list[tuple[float, float]]:
-        """How far each object rests from where it was found: of its centre of mass, m, and turned, rad."""
+        """Displacement of each object from where it was found: of its centre of mass, m, and its rotation, rad."""
         return [_motion(each, each.seen, end) for each, end in zip(self.objects, self.rest, strict=True)]
 
     def place_of(self, thing: Thing) -> int | None:
-        """Return the number of a thing's object; None where it is none of them."""
+        """Return the index of a located object; None if it is not in the layout."""
         return next((number for number, each in enumerate(self.objects) if each.thing is thing), None)
 
 
 def scene_id_of(seed: int) -> str:
-    """Return the id of the one scene of a located view."""
+    """Return the id of the scene of a located view."""
     return f"{LOCATED}_{seed}_000000"
 
 
 def located_scene(
     view: DepthView, things: Sequence[tuple[Thing, Twin]], world: WorldFrame, robot: str | None, seed: int
 ) -> LocatedScene:
-    """Return the layout of what was found in a view, of which at least one thing has a pose.
+    """Return the layout of the objects found in a view, at least one of which has a pose.
 
-    All objects are let go at once in PhysX, with the limits of ``manitwin layout``: of those that move by more than 1 cm, turn by
-    more than 5 degrees, or do not come to rest, the one that moves most becomes boxes, and the others are let go again. The same
-    arguments give the same record.
+    All objects are released at once in PhysX, with the limits of ``manitwin layout``. Among those that move by more than 1 cm,
+    turn by more than 5 degrees, or do not come to rest, the one that moves most is replaced by boxes, and the others are
+    released again. The result is deterministic.
     """
     objects, settings = located_objects(things, world), LayoutSettings()
     as_boxes: list[tuple[LocatedObject, str]] = []
@@ -92,7 +92,7 @@ def located_scene(
 
 
 def _leaves_its_place(place: int, each: LocatedObject, settled: SettledScene, settings: LayoutSettings) -> str:
-    """Say why an object does not stay where it is let go; empty where it does."""
+    """Return why an object does not stay after its release; empty if it stays."""
     moved_m, turned_rad = _motion(each, each.placed.object_to_world, settled.object_to_world[place])
     when = "when it is let go where it was found"
     if settled.lost[place] or moved_m > settings.max_moved_m:
@@ -142,7 +142,7 @@ def _record(
 
 
 def _bearer(place: int, objects: Sequence[LocatedObject], settled: SettledScene) -> str | None:
-    """Return the located object that one stands on; None: the table, or what nobody named."""
+    """Return the located object that supports an object; None for the table or an unknown obstacle."""
     own = objects[place].placed.name
     touched = settled.neighbours(own)
     if "table" in touched:
@@ -169,6 +169,6 @@ def _scene_object(each: LocatedObject, pose: np.ndarray, bearer: str | None) -> 
 
 
 def _motion(each: LocatedObject, before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
-    """Return how far the centre of mass is from where it was, m, and by how much the object is turned, rad."""
+    """Return the displacement of the centre of mass, m, and the rotation of the object, rad."""
     first, second = (transform_points(pose, each.placed.body.center_of_mass_m[None])[0] for pose in (before, after))
     return float(np.linalg.norm(second - first)), rotation_angle_rad(after[:3, :3] @ before[:3, :3].T)

@@ -1,4 +1,4 @@
-"""A picture of what was decided: the view, and over it each pose's outline, shade and object frame."""
+"""Overlay picture of a decision: the view with each pose's outline and shading, and the object frame."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manitwin.scenes.locate.pose_model import PoseModel
 
 PANEL_PX = 480
 COLORS = ((40, 200, 80), (255, 150, 30), (200, 80, 220), (60, 170, 255))
-"""Of poses, the best first."""
+"""Colours of poses, best first."""
 MASK_COLOR = (255, 220, 40)
 AXES = ((220, 50, 50), (60, 190, 60), (60, 110, 255))
 _AROUND, _TINT, _HIDDEN_TINT = 0.35, 0.5, 0.18
@@ -24,9 +24,9 @@ _AROUND, _TINT, _HIDDEN_TINT = 0.35, 0.5, 0.18
 def overlay(
     view: DepthView, mask: np.ndarray, model: PoseModel, poses: Sequence[PoseEstimate], tolerance_m: float
 ) -> np.ndarray:
-    """Return two panels ``(480, 960, 3) uint8`` cut to the thing: what is seen with the mask's outline, and the poses over it.
+    """Return two panels ``(480, 960, 3) uint8`` cropped to the object: the view with the mask's outline, and with the poses.
 
-    What stands behind something nearer is shaded less. The axes x, y, z of the best pose are red, green and blue.
+    Hidden parts are shaded less. The axes x, y, z of the best pose are red, green and blue.
     """
     base = view.rgb if view.rgb is not None else shaded_depth(view)
     shapes = [_drawn(view, model, pose.object_to_camera, tolerance_m) for pose in poses]
@@ -58,7 +58,7 @@ def shaded_depth(view: DepthView) -> np.ndarray:
 
 
 def _drawn(view: DepthView, model: PoseModel, pose: np.ndarray, tolerance_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return where an object is drawn, and where nothing nearer hides it, each ``(H, W) bool``."""
+    """Return where an object is rendered, and where nothing nearer hides it, each ``(H, W) bool``."""
     height, width = view.depth_m.shape
     corners = view.project(transform_points(pose, model.points))
     low = np.clip(np.floor(corners.min(0)).astype(int) - 2, 0, [width, height])
@@ -77,7 +77,7 @@ def _drawn(view: DepthView, model: PoseModel, pose: np.ndarray, tolerance_m: flo
 
 
 def _crop(shown: np.ndarray) -> tuple[int, int, int]:
-    """Return left, top and side of the square about what is shown; it may reach over the picture's edge."""
+    """Return left, top and side of the square around the shown pixels; it may exceed the picture."""
     rows, columns = np.flatnonzero(shown.any(1)), np.flatnonzero(shown.any(0))
     side = int((1 + 2 * _AROUND) * max(int(np.ptp(rows)), int(np.ptp(columns)), 24))
     return int((columns[0] + columns[-1] - side) // 2), int((rows[0] + rows[-1] - side) // 2), side

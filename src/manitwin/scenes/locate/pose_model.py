@@ -1,4 +1,4 @@
-"""What is prepared once of a twin to find its pose: surface points, what each side shows of them, rays, symmetries."""
+"""Precomputed model of a twin for pose search: surface points, visible points by direction, ray caster, symmetries."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from manitwin.twin.loaded_twin import Twin
 SURFACE_POINTS = 6000
 SHOWN_TRIED, SHOWN_KEPT = 900, 160
 ROUND_STEPS = 36
-"""Turns about the axis of a body of revolution that stand for all of them: every 10 degrees."""
+"""Discretized rotations about the axis of a body of revolution: every 10 degrees."""
 OWN_TURNS_DEG = np.arange(10, 360, 10)
-"""A handle on the wrong side is a local optimum of alignment: such turns are tried."""
+"""Rotations to escape local optima of alignment, such as a handle on the wrong side."""
 _SELF_POINTS = 200
 _AWAY = 2.0
-"""Diameters from which a side is looked at."""
+"""Distance in diameters from which visibility is tested."""
 
 
 @dataclass(frozen=True)
 class PoseModel:
     """A twin's surface in the object frame, m.
 
-    ``sides (V, 3)`` are directions towards the object's viewers and ``shown[v] (S, 3)`` the points that are seen from there;
-    ``center (3,)`` is the middle of the box. ``near_motions (T, 4, 4)`` turn the object so that much of its surface falls on
-    itself: a mug about the axis of its body.
+    ``sides (V, 3)`` are viewing directions from the object, and ``shown[v] (S, 3)`` the points visible from each;
+    ``center (3,)`` is the centre of the bounding box. ``near_motions (T, 4, 4)`` are motions that map much of the surface onto
+    itself, such as a rotation of a mug about the axis of its body.
     """
 
     twin_id: str
@@ -55,7 +55,7 @@ class PoseModel:
 
     @classmethod
     def of_mesh(cls, twin_id: str, mesh: trimesh.Trimesh) -> PoseModel:
-        """Prepare a surface in the object frame; same mesh, same model."""
+        """Prepare a surface in the object frame, deterministically."""
         rng = np.random.default_rng(0)
         points, normals, _ = sample_surface(mesh, SURFACE_POINTS, rng)
         caster = RayCaster(mesh)
@@ -78,7 +78,7 @@ class PoseModel:
         )
 
     def scaled(self, factor: float) -> PoseModel:
-        """Return the model of the same thing at another size, about the origin of the object frame."""
+        """Return the model scaled about the origin of the object frame."""
         points = self.surface.points * factor
         shown = tuple(each * factor for each in self.shown)
         motions = self.near_motions.copy()
@@ -97,7 +97,7 @@ class PoseModel:
 
     @property
     def diameter_m(self) -> float:
-        """The largest distance of two of its points."""
+        """The largest distance between two of its points."""
         return self.surface.diameter_m
 
     @property
@@ -107,10 +107,10 @@ class PoseModel:
 
     @cached_property
     def same_poses(self) -> np.ndarray:
-        """Return the proper motions ``(S, 4, 4)`` of the object frame after which the shape is where it was; identity first.
+        """The rotational symmetries ``(S, 4, 4)`` of the shape in the object frame, identity first.
 
-        A body of revolution is turned in steps about its axis, also after each turn that swaps its ends; a ball so after each
-        turn of a cube.
+        For a body of revolution, they are discretized rotations about its axis, also combined with a rotation that swaps its
+        ends; for a ball, combined with each rotation of a cube.
         """
         found = self.symmetries
         turns = [motion for motion in found.motions if np.linalg.det(motion) > 0]
@@ -125,7 +125,7 @@ class PoseModel:
 
 
 def _near_motions(surface: Surface, center: np.ndarray) -> np.ndarray:
-    """Return turns about the axes of the object frame, each aligned so that the nearest part of the surface falls on itself."""
+    """Return rotations about the axes of the object frame, each aligned so that most of the surface falls on itself."""
     turns = np.array(
         [
             trimesh.transformations.rotation_matrix(np.deg2rad(angle), axis, center)
@@ -140,7 +140,7 @@ def _near_motions(surface: Surface, center: np.ndarray) -> np.ndarray:
 def _shown_from(
     side: np.ndarray, points: np.ndarray, caster: RayCaster, diameter_m: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return those of some surface points that are seen from far along ``side``."""
+    """Return a subset of surface points that are visible from far along ``side``."""
     tried = points[rng.choice(len(points), min(SHOWN_TRIED, len(points)), replace=False)]
     away = _AWAY * diameter_m
     hit, _ = caster.first_hits(tried + side * away, np.broadcast_to(-side, tried.shape))

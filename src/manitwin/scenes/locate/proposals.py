@@ -1,4 +1,4 @@
-"""Things on a table without masks: what stands above the plane that most of the picture shows, cut where the depth jumps."""
+"""Object proposals without masks: segments above the dominant plane, separated at depth jumps."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from manitwin.scenes.locate.depth_view import DepthView, known_depth, measured_n
 LEAST_PX, MOST_PROPOSALS = 150, 16
 _FITTED, _TRIED, _PLANES = 4000, 200, 3
 _NEAR_M, _ABOVE_M, _BELOW_M, _JUMP_M = 0.004, 0.007, 0.5, 0.007
-"""Metres: off a plane that fits; above the table that is a thing; higher than any; and from one pixel to the next of another."""
+"""Metres: plane inliers; least height above the table; largest height; depth jump between neighbouring pixels."""
 _MOST_NOISE_M = 0.01
-"""A plane that noisier depths fit could be any."""
+"""With noisier depths, any plane would fit."""
 _LEAST_SHARE = 0.08
-"""Of all pixels, that a table has at least."""
+"""Least share of all pixels on a table."""
 _PARALLEL = np.cos(np.deg2rad(8))
 _MEDIAN_PX = 5
 
@@ -32,14 +32,14 @@ class Plane:
     offset_m: float
 
     def height_m(self, points: np.ndarray) -> np.ndarray:
-        """Return how far points ``(..., 3)`` are above it."""
+        """Return the heights of points ``(..., 3)`` above the plane."""
         return np.asarray(points @ self.normal - self.offset_m)
 
 
 def table_plane(view: DepthView, rng: np.random.Generator) -> Plane:
-    """Return the plane on which things stand: of the largest one and those parallel to it the one nearest to the camera.
+    """Return the support plane: among the largest plane and those parallel to it, the one nearest to the camera.
 
-    Fischler and Bolles 1981 (RANSAC), then least squares. Raises UsageError where no plane takes 8 % of the picture.
+    RANSAC (Fischler and Bolles 1981), followed by least squares. Raises UsageError if no plane covers 8 % of the picture.
     """
     pixels = np.flatnonzero(known_depth(view))
     if len(pixels) < _FITTED // 10:
@@ -63,7 +63,7 @@ def table_plane(view: DepthView, rng: np.random.Generator) -> Plane:
 
 
 def proposals(view: DepthView, plane: Plane) -> list[np.ndarray]:
-    """Return masks ``(H, W) bool`` of what stands above a plane, the largest first; things that touch may be in one."""
+    """Return masks ``(H, W) bool`` of segments above a plane, largest first; touching objects may share one."""
     depth = np.where(np.isfinite(view.depth_m), view.depth_m, 0.0).astype(np.float32)
     smooth = np.asarray(cv2.medianBlur(depth, _MEDIAN_PX)).astype(float)
     known = smooth > 0
@@ -79,7 +79,7 @@ def proposals(view: DepthView, plane: Plane) -> list[np.ndarray]:
 
 
 def _segments(depth: np.ndarray, inside: np.ndarray, jump_m: float) -> np.ndarray:
-    """Return a label ``(H, W)`` at each pixel: neighbours are of one segment where the depth goes on."""
+    """Return a segment label ``(H, W)`` for each pixel; neighbours with continuous depth share a segment."""
     numbers = np.arange(depth.size).reshape(depth.shape)
     pairs = []
     for a, b in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
@@ -91,7 +91,7 @@ def _segments(depth: np.ndarray, inside: np.ndarray, jump_m: float) -> np.ndarra
 
 
 def _cut_by_frame(mask: np.ndarray) -> bool:
-    """Return whether most of a segment's border is the picture's: furniture and backdrop, not a thing."""
+    """Return whether much of a segment's border is on the picture's border: furniture or backdrop rather than an object."""
     frame = int(mask[0].sum() + mask[-1].sum() + mask[:, 0].sum() + mask[:, -1].sum())
     return frame > np.sqrt(mask.sum())
 

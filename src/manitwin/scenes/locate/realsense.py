@@ -1,7 +1,7 @@
-"""Pictures of an Intel RealSense camera, or of a file that one recorded, by ``pyrealsense2`` where that is installed.
+"""Capture from an Intel RealSense camera, or from a recording of one, by ``pyrealsense2`` if installed.
 
-Written from librealsense's own documentation of 2.5x (pipeline, align, ``enable_device_from_file``); tested against a stand-in
-that keeps what is used of it, and never against a camera.
+Written from the documentation of librealsense 2.5x (pipeline, align, ``enable_device_from_file``), and tested against a
+stand-in for the used functions only, never against a camera.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from manitwin.scenes.locate.captured import Capture
 
 WIDTH_PX, HEIGHT_PX, RATE_HZ = 640, 480, 30
 FRAMES = 15
-"""Depths are the medians of so many frames, half a second: noise of single pixels goes, edges stay."""
+"""Number of frames, half a second, of which depths are the medians: this removes pixel noise and keeps edges."""
 WARM_UP = 30
-"""Frames that the exposure takes to settle; a recorded file has none to spare."""
+"""Frames until the exposure settles; skipped for a recorded file."""
 MOST_DISTORTION_PX = 1.5
-"""A pinhole is all that is asked for: a lens that bends a corner by more is refused."""
+"""Largest distortion at a corner; only pinhole cameras are supported."""
 
 
 def sdk() -> Any:
-    """Return the module; raises UsageError where it is not installed."""
+    """Return the module; raises UsageError if it is not installed."""
     try:
         return importlib.import_module("pyrealsense2")
     except ImportError as error:
@@ -35,10 +35,10 @@ def sdk() -> Any:
 
 
 def record(rs: Any, *, bag: Path | None = None, serial: str | None = None, frames: int = FRAMES) -> Capture:
-    """Return what a camera sees now, or what a recorded ``bag`` begins with: depths aligned with the colours.
+    """Return the current view of a camera, or the start of a recorded ``bag``, with depths aligned to the colours.
 
-    ``rs`` is the module; ``serial`` names one of several cameras. Raises Unavailable where there is no camera, no frame comes or
-    the file cannot be played, UsageError for a lens that is no pinhole.
+    ``rs`` is the module; ``serial`` selects one of several cameras. Raises Unavailable if there is no camera, no frame arrives
+    or the file cannot be played, UsageError for a lens with distortion.
     """
     pipeline, config = rs.pipeline(), rs.config()
     if bag is not None:
@@ -80,14 +80,14 @@ def record(rs: Any, *, bag: Path | None = None, serial: str | None = None, frame
 
 
 def _median(depths: np.ndarray) -> np.ndarray:
-    """Return the median ``(H, W)`` of the known depths of frames ``(N, H, W)``; 0 where fewer than half know one."""
+    """Return the median ``(H, W)`` of the known depths of frames ``(N, H, W)``; 0 if fewer than half have one."""
     known = np.ma.masked_equal(depths, 0)
     told = np.ma.median(known, axis=0).filled(0)
     return np.where((depths > 0).sum(0) * 2 >= len(depths), told, 0.0)
 
 
 def _intrinsics(lens: Any) -> np.ndarray:
-    """Return K ``(3, 3)``, pixels' centres at whole numbers as librealsense has them; raises UsageError for a bent picture."""
+    """Return K ``(3, 3)``, with pixel centres at whole numbers as in librealsense; raises UsageError for a distorted picture."""
     k = np.array([[lens.fx, 0, lens.ppx], [0, lens.fy, lens.ppy], [0, 0, 1.0]])
     coefficients = np.zeros(5)
     coefficients[: len(lens.coeffs)] = lens.coeffs

@@ -1,4 +1,4 @@
-"""Which thing of a view is a twin, and which twin of a data set a thing is: looks propose, what is explained decides."""
+"""Recognition of twins in a view: appearance ranks candidates, and the pose score decides."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from manitwin.twin.loaded_twin import Twin
 
 NO_MASK = "no object stands above the table in this picture; give --mask"
 CANDIDATES = 5
-"""Twins that are tried of a thing, the most alike: the first alone is often another (docs/search.md)."""
+"""Number of candidate twins for an object, most similar first; the first alone is often wrong (docs/search.md)."""
 
 
 @dataclass(frozen=True)
 class Tried:
-    """A twin that was looked for in a thing's place: how alike it looks (None: not asked), and the score of its best pose."""
+    """A twin that was tried for an object: its similarity in appearance (None: not computed), and the score of its best pose."""
 
     twin_id: str
     likeness: float | None
@@ -34,7 +34,7 @@ class Tried:
 
 @dataclass(frozen=True)
 class Thing:
-    """A thing of a view: its mask ``(H, W) bool``, the answer, and every twin that was tried, the best first."""
+    """An object in a view: its mask ``(H, W) bool``, the decision, and every twin that was tried, best first."""
 
     mask: np.ndarray
     location: Location
@@ -43,10 +43,10 @@ class Thing:
 
 
 class DatasetTwins:
-    """The accepted twins of a data set with an index, each prepared once, and what they look like."""
+    """The accepted twins of a data set with an index: models, prepared once each, and appearances."""
 
     def __init__(self, root: DatasetRoot, on_twin: Callable[[str], None] = lambda twin_id: None):
-        """Read looks that are kept, and draw the others; raises UsageError without an index, and for a data set at a URL."""
+        """Read cached appearances and render the others; raises UsageError without an index, and for a data set at a URL."""
         rows = Index(root).select("twins", columns=["twin_id", "revision"]).to_pylist()
         self._root = root
         self._looks = dict(twin_looks(root, {row["twin_id"]: row["revision"] for row in rows}, on_twin))
@@ -60,13 +60,13 @@ class DatasetTwins:
         return Twin(self._root.local / self._root.twin_name(twin_id))
 
     def model(self, twin_id: str) -> PoseModel:
-        """Return one of the twins, prepared."""
+        """Return the prepared model of a twin."""
         if twin_id not in self._models:
             self._models[twin_id] = PoseModel.of_twin(self.twin(twin_id))
         return self._models[twin_id]
 
     def ranked(self, rgb: np.ndarray, mask: np.ndarray) -> list[tuple[str, float]]:
-        """Return the twins with how alike they look to what ``mask`` shows, the most alike first."""
+        """Return the twins with their similarity to what ``mask`` shows, most similar first."""
         rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
         cut = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
         look = look_of(rgb[cut], mask[cut])
@@ -83,7 +83,7 @@ def which_twin(
     seed: int = 0,
     guess: Guess | None = None,
 ) -> Thing:
-    """Look for the twins that a thing looks most like, and return the one that explains it best, or that none does.
+    """Locate the twins most similar to an object, and return the one that explains it best, or a rejection.
 
     Raises UsageError for a view without colours.
     """
@@ -101,7 +101,7 @@ def which_twin(
 def where_is(
     view: DepthView, masks: Sequence[np.ndarray], model: PoseModel, *, seed: int = 0, guess: Guess | None = None
 ) -> Thing:
-    """Look for a twin in each of several masks, and return the one that it explains best, or that it is none of them."""
+    """Locate a twin in each of several masks, and return the mask that it explains best, or a rejection."""
     if not masks:
         raise UsageError(NO_MASK)
     answers = [(locate_in_view(view, mask, model, seed=seed, guess=guess), mask) for mask in masks]

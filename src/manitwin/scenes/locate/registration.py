@@ -1,4 +1,4 @@
-"""Trimmed point-to-plane ICP of observed points onto a known surface, for many starts at once."""
+"""Trimmed point-to-plane ICP of observed points to a known surface, batched over many starts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _DAMPING = 1e-6
 
 @dataclass(frozen=True)
 class Surface:
-    """Points ``(N, 3)`` of a surface, m, their outward unit normals and search tree, and its largest extent."""
+    """Points ``(N, 3)`` of a surface, m, their outward unit normals and search tree, and its diameter."""
 
     points: np.ndarray
     normals: np.ndarray
@@ -35,9 +35,9 @@ def align(
 ) -> np.ndarray:
     """Return ``object_to_camera (K, 4, 4)`` after ``iterations`` from the starts ``poses``.
 
-    ``observed (N, 3)`` are points in the camera frame. Each step pairs them with the nearest surface points, keeps the nearest
-    ``kept_share`` of the pairs and those within ``reach_m``, with ``facing`` only those whose surface turns to the camera, and
-    takes the linearised point-to-plane step (Chen and Medioni 1992; trimming: Chetverikov et al. 2002).
+    ``observed (N, 3)`` are points in the camera frame. Each step pairs them with the nearest surface points, keeps the closest
+    ``kept_share`` of the pairs and those within ``reach_m``, with ``facing`` only pairs whose surface normal points to the
+    camera, and takes the linearized point-to-plane step (Chen and Medioni 1992; trimming: Chetverikov et al. 2002).
     """
     for _ in range(iterations):
         back = inverse(poses)
@@ -47,7 +47,7 @@ def align(
         limit = np.minimum(np.quantile(distance, kept_share, axis=1), reach_m)
         normals = surface.normals[nearest]
         weight = (distance <= limit[:, None]).astype(float)
-        if facing:  # what the camera sees turns to it: the inside of a thin wall lies as near as its outside
+        if facing:  # visible surfaces face the camera, while the inside of a thin wall is as close as its outside
             weight *= ((back[:, None, :3, 3] - points) * normals).sum(2) > 0
         poses = stepped(poses, points, surface.points[nearest], normals, weight, surface.diameter_m)
     return poses
@@ -61,10 +61,10 @@ def stepped(
     weight: np.ndarray,
     diameter_m: float,
 ) -> np.ndarray:
-    """Return ``object_to_camera (K, 4, 4)`` after one linearised point-to-plane step.
+    """Return ``object_to_camera (K, 4, 4)`` after one linearized point-to-plane step.
 
-    ``observed`` and ``surface (K, N, 3)`` are paired points in the object frame, with the surface's ``normals`` and the weight
-    ``(K, N)`` of each pair. What the pairs do not tell does not move.
+    ``observed`` and ``surface (K, N, 3)`` are paired points in the object frame, with ``normals`` of the surface and the weight
+    ``(K, N)`` of each pair. Damping keeps unobservable motions at zero.
     """
     rows = np.concatenate([np.cross(observed, normals), normals], 2)
     gaps = ((surface - observed) * normals).sum(2)

@@ -1,4 +1,4 @@
-"""What a depth camera would see of a drawn layout: true colours, depths with its noise, and the masks of the objects."""
+"""Simulated capture of a rendered layout: true colours, depths with camera noise, and object masks."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ DEVICE = "rehearsal: a drawn layout with the noise of a depth camera"
 
 
 def capture_of_scene(place: Path, camera: str, seed: int) -> Capture:
-    """Return what one camera of a scene sees; the robot's base is the origin of its world.
+    """Return the simulated view of one camera of a scene; the robot's base is the origin of its world.
 
-    Raises UsageError for a place that is no single drawn scene, or has no such camera.
+    Raises UsageError for a path that is not a single rendered scene, or lacks this camera.
     """
     files = scene_files(place)
     if len(files) != 1:

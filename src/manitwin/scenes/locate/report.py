@@ -1,4 +1,4 @@
-"""What is written and printed of a location: plain values, and a folder with a picture."""
+"""Output of localization: JSON values, and a folder with overlay pictures."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def location_document(
     placements: Sequence[CarriedPlacement] = (),
     size: SizeFit | None = None,
 ) -> dict[str, Any]:
-    """Return a location as JSON values: the answer, its poses, what it was judged by, and what of the twin can be used there.
+    """Return a location as JSON values: the decision, its poses, its thresholds, and the usable annotations of the twin.
 
-    ``placements``: its resting poses, where they were asked for; ``size``: the size that was found.
-    ``estimator`` is what guessed the poses in the place of the search.
+    ``placements`` are its resting poses, if requested; ``size`` is the fitted size; ``estimator`` names what guessed the poses
+    in place of the search.
     """
     location, symmetries = thing.location, thing.model.symmetries
     return {
@@ -143,7 +143,7 @@ def things_document(
     estimator: str | None = None,
     placements: Sequence[Sequence[CarriedPlacement]] = (),
 ) -> dict[str, Any]:
-    """Return which twin of a data set each thing of a view is, what was tried in its place, and the grasps of each."""
+    """Return, for each object of a view, its twin in a data set, the twins tried for it, and its grasps."""
     return {
         "dataset": dataset,
         "things": [
@@ -170,9 +170,9 @@ def write_location(
     things: Sequence[Thing],
     layout: tuple[LocatedScene, str] | None = None,
 ) -> None:
-    """Write ``location.json``, an ``overlay_<n>.png`` of each thing, and the layout into a new folder, whole or not at all.
+    """Write ``location.json``, an ``overlay_<n>.png`` for each object, and the layout into a new folder, atomically.
 
-    ``layout`` is the located scene and the place of its twins. Equal input gives equal bytes.
+    ``layout`` is the located scene and the data set of its twins. Output is deterministic.
     """
     with new_folder(out) as folder:
         if layout is not None:

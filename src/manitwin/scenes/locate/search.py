@@ -1,4 +1,4 @@
-"""The poses in which a twin may be seen: sides and turns compared by points, aligned, drawn and compared."""
+"""Pose search: start orientations compared by points, aligned, rendered and scored."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from manitwin.scenes.locate.registration import align
 from manitwin.scenes.locate.starts import hidden_direction, starts
 
 FOLLOWED, REFINED, TURNED, AROUND, POLISHED = 20, 8, 12, 16, 10
-"""Poses that are aligned roughly, refined, and refined again after turns about the object's own axes."""
+"""Numbers of poses that are aligned roughly, refined, and refined again after rotations about the object's own axes."""
 POLISHING, FOLLOWED_LAST = 5, 3
 CLIMBED, CLIMBS = 3, (1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.25, 0.25)
-"""Poses that climb, and the lengths of their steps: shares of a fiftieth of the diameter, and of 3 degrees."""
+"""Number of poses that climb, and their relative step lengths (times ``CLIMB_SHARE`` of the diameter and ``CLIMB_RAD``)."""
 CLIMB_SHARE, CLIMB_RAD = 0.02, np.deg2rad(3)
 APART_RAD = np.deg2rad(8)
-"""Turns that alignment makes one are not followed twice."""
+"""Poses that differ by a smaller rotation are followed only once."""
 FEW, MANY, ALL = 150, 800, 2400
-"""Observed points and pixels of the first and of the later rounds, and those that decide."""
+"""Numbers of observed points and pixels in the first and in later rounds, and for the decision."""
 TOLERANCE_M, TOLERANCE_OF_NOISE = 0.003, 2.5
 ROUGHLY = 2.0
-"""Tolerances of poses that are not yet refined."""
+"""Multiple of the tolerance for poses that are not refined yet."""
 
 
 @dataclass(frozen=True)
 class Candidates:
-    """Poses ``object_to_camera (K, 4, 4)``, the best first, their scores ``(K,)``, and how they were scored.
+    """Poses ``object_to_camera (K, 4, 4)``, best first, their scores ``(K,)``, and the data of the scoring.
 
-    ``gains (K, N)`` is what each pixel of the ``evidence`` says of each (``comparison.pixel_gains``).
+    ``gains (K, N)`` are those of each pixel of the ``evidence`` for each pose (``comparison.pixel_gains``).
     """
 
     poses: np.ndarray
@@ -45,9 +45,9 @@ class Candidates:
 def find_candidates(
     view: DepthView, mask: np.ndarray, model: PoseModel, rng: np.random.Generator, guesses: np.ndarray | None = None
 ) -> Candidates:
-    """Search all orientations for those in which the object explains what ``mask (H, W) bool`` shows.
+    """Search all orientations for poses in which the object explains what ``mask (H, W) bool`` shows.
 
-    With ``guesses (K, 4, 4)`` these are aligned instead of starts from all sides; what follows is the same.
+    With ``guesses (K, 4, 4)``, these replace the starts from all directions; all later steps are the same.
     """
     observed = observed_points(view, mask, model.diameter_m, rng)
     tolerance_m = TOLERANCE_M + TOLERANCE_OF_NOISE * measured_noise_m(view, mask)
@@ -69,7 +69,7 @@ def find_candidates(
     poses, scores = _finer(model, poses, evidence, tolerance_m)
     centers = poses[
         _spread(poses, scores, FOLLOWED_LAST)
-    ]  # of a block with a hidden end, the second turn is one of a flip
+    ]  # for a block with a hidden end, it takes a second rotation to undo a flip
     around = np.concatenate([centers, (centers[:, None] @ model.near_motions).reshape(-1, 4, 4)])
     rough = explained(model, around, first, tolerance_m)
     around, around_scores = _finer(model, around[_spread(around, rough, AROUND)], evidence, tolerance_m)
@@ -80,7 +80,7 @@ def find_candidates(
 
 
 def _decided(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float) -> Candidates:
-    """Return candidates scored by as many pixels as decide, the best first, which is aligned by them once more."""
+    """Return candidates scored with the final number of pixels, best first; the best ones are polished once more."""
     finer = np.concatenate([poses, polished(model, poses[:FOLLOWED_LAST], evidence, tolerance_m, POLISHING)])
     gains = pixel_gains(model, finer, evidence, tolerance_m)
     scores = scores_of(gains, evidence)
@@ -89,7 +89,7 @@ def _decided(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_
 
 
 def observed_points(view: DepthView, mask: np.ndarray, diameter_m: float, rng: np.random.Generator) -> np.ndarray:
-    """Return points ``(N, 3)`` of what the mask shows, without those that are farther from the middle than the object is long."""
+    """Return points ``(N, 3)`` within the mask, without those whose depth is off the median by more than the diameter."""
     pixels = np.flatnonzero(mask & known_depth(view))
     depth = view.depth_m.ravel()[pixels]
     pixels = pixels[np.abs(depth - np.median(depth)) < diameter_m]
@@ -104,9 +104,9 @@ def _refined(observed: np.ndarray, model: PoseModel, poses: np.ndarray) -> np.nd
 def _finer(
     model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the poses ``(K, 4, 4)``, polished where that explains more, with their scores, the best first.
+    """Return the poses ``(K, 4, 4)``, polished where this improves the score, with their scores, best first.
 
-    What lies close behind a thin thing pulls at it: of a fork on a table most polished poses explain less than before.
+    Surfaces close behind a thin object attract it: most polished poses of a fork on a table score less than before.
     """
     after = polished(model, poses, evidence, tolerance_m, POLISHING)
     before_scores, scores = (explained(model, each, evidence, tolerance_m) for each in (poses, after))
@@ -117,9 +117,9 @@ def _finer(
 
 
 def climbed(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float) -> np.ndarray:
-    """Return poses ``(K, 4, 4)`` after steps uphill on the score itself, each along or about one axis of the camera.
+    """Return poses ``(K, 4, 4)`` after hill climbing on the score, with steps along or about single axes of the camera.
 
-    Alignment trusts each pixel's depth, and is led astray by those of an edge; the score forgives them.
+    Alignment trusts each pixel's depth and is misled by edge pixels, to which the score is robust.
     """
     length_m = CLIMB_SHARE * model.diameter_m
     axes = np.concatenate([np.eye(3), -np.eye(3)])
@@ -142,7 +142,7 @@ def climbed(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m
 
 
 def _spread(poses: np.ndarray, scores: np.ndarray, count: int) -> np.ndarray:
-    """Return the places of the best poses of which no two are turned less than ``APART_RAD`` from each other."""
+    """Return the indices of the best poses, no two of which differ by a rotation of less than ``APART_RAD``."""
     kept: list[int] = []
     for place in _best(scores, len(scores)):
         turn = poses[kept, :3, :3].transpose(0, 2, 1) @ poses[place, :3, :3]

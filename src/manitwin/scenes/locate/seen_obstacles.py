@@ -1,4 +1,4 @@
-"""What is seen on a table and is no located twin, as boxes that nothing may run into."""
+"""Visible obstacles on a table that are no located twins, as boxes for collision checks."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from manitwin.scenes.locate.depth_view import DepthView, known_depth
 from manitwin.scenes.locate.world_frame import WorldFrame
 
 CELL_M, MOST_BOXES = 0.02, 80
-"""Columns of 2 cm, wider where there would be more boxes than that."""
+"""Columns of 2 cm, wider if there would be more boxes than this."""
 AROUND_M, HIGHEST_M = 0.8, 0.6
 _ABOVE_M, _LEAST_POINTS, _ALIKE_M, _BELOW_M, _OWN_M = 0.01, 4, 0.02, 0.01, 0.012
 _JUMP_M, _JUMP_PX = 0.02, 3
-"""Depths beside a jump are of neither side: they would make columns in the air."""
+"""Depths beside a jump belong to neither side and would create columns in the air."""
 
 
 @dataclass(frozen=True)
 class SeenBox:
-    """A box along the world's axes, from ``low_m (3,)`` to ``high_m (3,)``."""
+    """An axis-aligned box in the world, from ``low_m (3,)`` to ``high_m (3,)``."""
 
     low_m: np.ndarray
     high_m: np.ndarray
@@ -31,11 +31,11 @@ class SeenBox:
 def seen_boxes(
     view: DepthView, located: np.ndarray, world: WorldFrame, surfaces: np.ndarray, noise_m: float
 ) -> list[SeenBox]:
-    """Return boxes of what stands on the table and is not ``located (H, W) bool``, near to the things.
+    """Return boxes of visible surfaces above the table that are not ``located (H, W) bool``, near the objects.
 
-    ``surfaces (N, 3)`` are points of the located things in the world: what is within 12 mm of them is theirs. Each box is a
-    column from the table, since what is below a seen top is hidden, up to the highest point; over a thing it begins 1 cm below
-    the lowest point that is seen. Columns alike in height are one box.
+    ``surfaces (N, 3)`` are points of the located objects in the world: points within 12 mm of them belong to these. Each box is
+    a column from the table up to the highest point, since the space below a visible top is hidden; above a located object, it
+    begins 1 cm below the lowest visible point. Columns of similar height are merged.
     """
     pixels = np.flatnonzero(known_depth(view) & ~located & ~_beside_jumps(view))
     points = transform_points(world.camera_to_world, view.points(pixels))
@@ -59,7 +59,7 @@ def _beside_jumps(view: DepthView) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Column:
-    """Cells ``(first, last)`` along x and y, and the corners of what is seen in them."""
+    """Cell ranges ``(first, last)`` along x and y, and the corners of the points in them."""
 
     x: tuple[int, int]
     y: tuple[int, int]
@@ -67,11 +67,11 @@ class _Column:
     high_m: np.ndarray
 
     def alike(self, other: _Column) -> bool:
-        """Tell whether two columns begin and end at about the same heights."""
+        """Return whether two columns begin and end at similar heights."""
         return bool(abs(self.low_m[2] - other.low_m[2]) < _ALIKE_M and abs(self.high_m[2] - other.high_m[2]) < _ALIKE_M)
 
     def joined(self, other: _Column) -> _Column:
-        """Return both as one, the ``other`` one being behind."""
+        """Return the union with an ``other`` column that follows."""
         return _Column(
             (self.x[0], other.x[1]),
             (self.y[0], other.y[1]),
@@ -98,7 +98,7 @@ def _boxes(points: np.ndarray, footprints: np.ndarray, table_m: float, cell_m: f
 
 
 def _runs(columns: list[_Column]) -> list[_Column]:
-    """Return rows of columns side by side along x that are about as low and as high."""
+    """Return runs of adjacent columns along x with similar heights."""
     runs: list[_Column] = []
     for column in sorted(columns, key=lambda each: (each.y, each.x)):
         if runs and (last := runs[-1]).y == column.y and last.x[1] == column.x[0] - 1 and last.alike(column):
@@ -109,7 +109,7 @@ def _runs(columns: list[_Column]) -> list[_Column]:
 
 
 def _merged(runs: list[_Column]) -> list[_Column]:
-    """Return the runs with those of neighbouring rows as one that begin and end at the same cells."""
+    """Merge runs of neighbouring rows with the same cell range and similar heights."""
     done: list[_Column] = []
     for run in runs:
         for number, last in enumerate(done):

@@ -1,4 +1,4 @@
-"""The size of a twin whose size was a guess, by what a depth picture shows of the thing."""
+"""Fit of the size of a twin whose size was a guess, from a depth picture of the object."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from manitwin.scenes.locate.recognition import NO_MASK, Thing, Tried
 from manitwin.scenes.locate.search import Candidates, find_candidates
 
 LARGEST_FACTOR = 2.0
-"""A photo's size is guessed by what it shows: nearly all things of a name are within this factor of the usual one."""
+"""Search range: nearly all objects of a category are within this factor of the usual size, which is guessed for photos."""
 COARSE, NEAR, NEAR_STEP, FINE_STEP = 7, 4, 0.03, 0.01
-"""Sizes that are searched for from all sides; then so many to both sides of the best, and two steps about the best of these."""
+"""Numbers of sizes searched from all directions, then on both sides of the best, then two fine steps around the best of these."""
 SAME_SIZE = 0.05
-"""A size that differs by less changes no grasp: wider than the hand's play it is not."""
+"""A smaller size difference does not affect grasps, as it is within the play of the hand."""
 OTHER_SIZE = (
     "the object has another size than its twin, so the grasps and the mass of the twin do not apply; build the twin"
     " again with the size found"
@@ -31,10 +31,10 @@ _POSES = 4
 
 @dataclass(frozen=True)
 class SizeFit:
-    """The ``factor`` from the twin's size to that of the thing, and those between which the picture does not tell.
+    """The ``factor`` from the twin's size to that of the object, and its interval of indistinguishable values.
 
-    ``location`` and ``model`` are of the twin at that size. ``shape_off_m`` is the median difference in depth of what is seen
-    from the twin at that size: how far its shape, which was a guess too, is off; None where nothing was found.
+    ``location`` and ``model`` are those of the twin at this size. ``shape_off_m`` is the median depth difference between the
+    observation and the twin at this size, which measures how wrong its guessed shape is; None if nothing was found.
     """
 
     factor: float
@@ -46,16 +46,16 @@ class SizeFit:
 
     @property
     def is_own(self) -> bool:
-        """Whether it is the twin's own size, as far as grasps feel it."""
+        """Whether it is the twin's own size, up to the tolerance of grasps."""
         return abs(self.factor - 1) <= SAME_SIZE
 
 
 def thing_of_any_size(
     view: DepthView, masks: Sequence[np.ndarray], model: PoseModel, *, seed: int = 0
 ) -> tuple[Thing, SizeFit]:
-    """Look for a twin of unknown size in each of several masks, and return the one that it explains best, with its size.
+    """Locate a twin of unknown size in each of several masks, and return the mask that it explains best, with its size.
 
-    Raises UsageError where there is no mask.
+    Raises UsageError if there is no mask.
     """
     if not masks:
         raise UsageError(NO_MASK)
@@ -66,10 +66,10 @@ def thing_of_any_size(
 
 
 def fit_size(view: DepthView, mask: np.ndarray, model: PoseModel, *, seed: int = 0) -> SizeFit:
-    """Find the size at which a twin explains most of what ``mask (H, W) bool`` shows, and where it is then.
+    """Find the size at which a twin explains most of what ``mask (H, W) bool`` shows, and its location.
 
-    Depths are metres, so that the size shows in what is seen as near as in its outline. Of the sizes that are tried, those that
-    explain as much as the best (``AMBIGUOUS_MARGIN``) are the interval.
+    Depths are metric, so that size is observable from the distance and the outline together. The interval contains the tried
+    sizes that score as much as the best, within ``AMBIGUOUS_MARGIN``.
     """
     tried: dict[float, Candidates] = {}
     for factor in np.geomspace(1 / LARGEST_FACTOR, LARGEST_FACTOR, COARSE):
@@ -95,7 +95,7 @@ def _best(tried: dict[float, Candidates]) -> float:
 
 
 def _at_size(poses: np.ndarray, model: PoseModel, before: float, after: float) -> np.ndarray:
-    """Return poses ``(K, 4, 4)`` of the object at another size whose middle stays where it is."""
+    """Return poses ``(K, 4, 4)`` of the object at another size, with its centre unchanged."""
     moved = []
     for pose in poses:
         middle = transform_points(pose, before * model.center[None])[0]

@@ -1,4 +1,4 @@
-"""First guesses of poses: sides and turns of a twin, laid over all observed points, or over the edges that are not hidden."""
+"""Start poses: viewing directions and rolls of a twin, aligned with all observed points, or with edges that are not hidden."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from manitwin.scenes.locate.pose_model import PoseModel
 TURNS = 12
 STARTS = 40
 COMPARED = 120
-"""Observed points that guesses are compared by."""
+"""Number of observed points for comparing start poses."""
 _RING_PX = 4
-_NOTHING_M = 1e6  # OpenCV takes a border of its own for infinite
+_NOTHING_M = 1e6  # OpenCV treats an infinite border value as its own default
 _NEARER_M = 0.01
 _LEAST_HIDDEN, _LEAST_ONE_SIDED = 0.03, 0.3
-"""Of the mask's border: what something nearer hides, and how far to one side that lies (1: all in one direction)."""
+"""Least share of the mask's border that is hidden by something nearer, and its least one-sidedness (1: one direction)."""
 _EDGE = 0.03
 
 
 def hidden_direction(view: DepthView, mask: np.ndarray) -> np.ndarray | None:
-    """Return the direction ``(2,)`` in the picture (right, down) in which something nearer, or the frame, cuts the thing off.
+    """Return the picture direction ``(2,)`` (right, down) in which something nearer, or the frame, cuts the object off.
 
-    None where nothing does, or on all sides.
+    None if nothing does, or if it is cut off on all sides.
     """
     inner = np.pad(np.where(mask & known_depth(view), view.depth_m, _NOTHING_M), _RING_PX, constant_values=_NOTHING_M)
     kernel = np.ones((2 * _RING_PX + 1,) * 2, np.uint8)
@@ -33,7 +33,7 @@ def hidden_direction(view: DepthView, mask: np.ndarray) -> np.ndarray | None:
     shown = np.pad(mask, _RING_PX)
     depth = np.pad(view.depth_m, _RING_PX, constant_values=-1.0)
     ring = (beside < _NOTHING_M) & ~shown & (depth != 0)
-    hides = ring & (depth < beside - _NEARER_M)  # beyond the frame is -1: nearer than all
+    hides = ring & (depth < beside - _NEARER_M)  # outside the frame it is -1, nearer than anything
     if not ring.any() or hides.sum() < _LEAST_HIDDEN * ring.sum():
         return None
     rows, columns = np.nonzero(shown)
@@ -46,10 +46,10 @@ def hidden_direction(view: DepthView, mask: np.ndarray) -> np.ndarray | None:
 
 
 def starts(observed: np.ndarray, model: PoseModel, hidden: np.ndarray | None) -> np.ndarray:
-    """Return the poses ``object_to_camera (STARTS, 4, 4)`` whose shown points are nearest to the observed ones ``(N, 3)``.
+    """Return the poses ``object_to_camera (STARTS, 4, 4)`` whose visible points are closest to the observed ones ``(N, 3)``.
 
-    Half of them are laid over the edges opposite to the direction ``hidden (2,)``, where there is one: the mean of what is
-    seen of a half hidden thing is not that of the thing.
+    If there is a ``hidden (2,)`` direction, half of them are aligned with the edges opposite to it, because the mean of the
+    visible points of a partly hidden object is not that of the object.
     """
     sets = [_ranked(observed, model, None)]
     if hidden is not None:
@@ -78,10 +78,9 @@ def _ranked(observed: np.ndarray, model: PoseModel, hidden: np.ndarray | None) -
 
 
 def _at_edges(observed: np.ndarray, drawn: np.ndarray, hidden: np.ndarray) -> np.ndarray:
-    """Return the shifts ``(K, 3)`` that lay drawn points ``(K, S, 3)`` on the observed edge opposite to ``hidden``.
+    """Return the shifts ``(K, 3)`` that align rendered points ``(K, S, 3)`` with the observed edge opposite to ``hidden``.
 
-    Across that direction the middles of what lies as far along it as the observed points are laid on each other, in depth the
-    means.
+    Perpendicular to that direction, the middles of the points within the observed range are aligned, and in depth the means.
     """
     across = np.array([-hidden[1], hidden[0]])
     seen_along, seen_across = observed[:, :2] @ hidden, observed[:, :2] @ across

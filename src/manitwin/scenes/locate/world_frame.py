@@ -1,4 +1,4 @@
-"""The world of a located scene: +Z up from the table, and the robot's base at the origin where a calibration says where it is."""
+"""World frame of a located scene: +Z up from the table, with the robot's base at the origin if a calibration is given."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from manitwin.scenes.locate.depth_view import DepthView, known_depth
 from manitwin.scenes.locate.proposals import Plane
 
 MOST_LEAN_RAD = np.deg2rad(3.0)
-"""Between the seen table and the base's horizontal: a calibration is good to a degree, tables are level to less."""
+"""Largest tilt of the observed table in the base's frame: calibrations are accurate to a degree, and tables level to less."""
 AHEAD_M = 0.5
-"""Without a calibration the things lie so far ahead of the origin: the middle of a table arm's reach."""
+"""Distance of the objects from the origin without a calibration: the middle of a table-mounted arm's reach."""
 AROUND_M = 1.0
 _ON_PLANE_M = 0.006
 _EDGE_SHARE = 0.01
@@ -23,10 +23,10 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class WorldFrame:
-    """``camera_to_world (4, 4)``, m, +Z up; the table's height; ``lean_rad`` off the base's horizontal.
+    """``camera_to_world (4, 4)``, m, +Z up; the table's height; its tilt ``lean_rad`` in the base's frame.
 
-    The table leans by this in the base's frame, and is taken for level. ``calibrated``: the origin is the robot's base; else
-    it is assumed, on the camera's side of the things.
+    The world is rotated so that the table is level. ``calibrated``: the origin is the robot's base; otherwise its position is
+    assumed, on the camera's side of the objects.
     """
 
     camera_to_world: np.ndarray
@@ -38,7 +38,7 @@ class WorldFrame:
 def world_of_base(camera_to_base: np.ndarray, plane: Plane, about: np.ndarray) -> WorldFrame:
     """Return the base's frame, levelled at the table below the point ``about (3,)`` in the camera's frame.
 
-    Raises UsageError where the table leans by more than 3 degrees: the calibration, or the plane, is of something else.
+    Raises UsageError if the table tilts by more than 3 degrees, since the calibration or the plane is then wrong.
     """
     up = camera_to_base[:3, :3] @ plane.normal
     lean_rad = float(np.arccos(np.clip(up @ _UP, -1, 1)))
@@ -57,7 +57,7 @@ def world_of_base(camera_to_base: np.ndarray, plane: Plane, about: np.ndarray) -
 def world_of_table(plane: Plane, about: np.ndarray) -> WorldFrame:
     """Return a frame with the table at z = 0, +X away from the camera, and the point ``about (3,)`` above (0.5, 0)."""
     ahead = np.array([0.0, 0.0, 1.0]) - plane.normal[2] * plane.normal
-    if np.linalg.norm(ahead) < 0.1:  # it looks straight down: away is up in the picture
+    if np.linalg.norm(ahead) < 0.1:  # for a vertical view, away from the camera is up in the picture
         ahead = np.array([0.0, -1.0, 0.0]) + plane.normal[1] * plane.normal
     ahead /= np.linalg.norm(ahead)
     turn = np.stack([ahead, np.cross(plane.normal, ahead), plane.normal])
@@ -66,15 +66,15 @@ def world_of_table(plane: Plane, about: np.ndarray) -> WorldFrame:
 
 
 def table_points(view: DepthView, world: WorldFrame, noise_m: float) -> np.ndarray:
-    """Return where the table is seen ``(N, 2)``, m in the world."""
+    """Return the visible points ``(N, 2)`` of the table, m in the world."""
     points = transform_points(world.camera_to_world, view.points(np.flatnonzero(known_depth(view))))
     return np.asarray(points[np.abs(points[:, 2] - world.table_m) < _ON_PLANE_M + 2 * noise_m, :2])
 
 
 def seen_rectangle(points: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners ``(2,)`` of the rectangle along the axes that points ``(N, 2)`` of the table take up.
+    """Return the corners ``(2,)`` of the axis-aligned rectangle of the table's points ``(N, 2)``.
 
-    Points farther than a metre from those of the things, ``kept (K, 2)``, which are inside of it in any case, are of no matter.
+    It always contains ``kept (K, 2)``, the points of the objects; points more than a metre from their mean are ignored.
     """
     middle = kept.mean(0)
     near = points[np.linalg.norm(points - middle, axis=1) < AROUND_M]

@@ -1,1 +1,1 @@
-"""What pictures of scenes show, told exactly: the truth of each picture, and data sets for perception made of it."""
+"""Perception data from scenes: exact ground truth of each picture, and data sets in common formats."""

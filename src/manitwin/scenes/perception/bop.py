@@ -1,4 +1,4 @@
-"""The BOP format, on which pose estimators train (github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md)."""
+"""BOP format for pose estimation (github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from manitwin.scenes.perception.output import Output
 from manitwin.scenes.perception.scene_truth import PictureTruth, SceneTruth
 from manitwin.scenes.perception.splits import split_of
 
-KIND = "pbr"  # BOP's word for what is rendered
+KIND = "pbr"  # BOP's term for rendered pictures
 NO_BOX = [-1, -1, -1, -1]
 
 
@@ -31,10 +31,10 @@ def write_bop(
     twin_folder: Callable[[str], Path],
     validation_share: float,
 ) -> None:
-    """Write ``models/``, ``camera.json`` and ``<split>_pbr/<scene>/`` with colours, depths, masks and their truth.
+    """Write ``models/``, ``camera.json`` and ``<split>_pbr/<scene>/`` with colours, depths, masks and ground truth.
 
-    Objects are twins, numbered from 1 in the order of their ids; ``objects.json`` says which, and their categories. Lengths are
-    millimetres, cameras have OpenCV's axes, and K counts pixels from the centre of the upper left one.
+    Objects are twins, numbered from 1 in the order of their ids; ``objects.json`` gives their ids and categories. Lengths are
+    in millimetres, cameras have OpenCV's axes, and K has the centre of the upper left pixel at the origin.
     """
     categories = {thing.twin_id: thing.category for scene in scenes for thing in scene.record.objects}
     models = {twin_id: BopModel.of_twin(twin_folder(twin_id)) for twin_id in sorted(categories)}
@@ -106,7 +106,7 @@ def _write_scene(
 
 
 def bop_intrinsics(picture: PictureTruth) -> np.ndarray:
-    """Return ``K (3, 3)`` as BOP's and OpenCV's tools take it: (0, 0) is the centre of the upper left pixel."""
+    """Return ``K (3, 3)`` in the convention of BOP and OpenCV: (0, 0) is the centre of the upper left pixel."""
     intrinsics = picture.intrinsics.copy()
     intrinsics[:2, 2] -= 0.5
     return intrinsics

@@ -1,4 +1,4 @@
-"""Object models as BOP has them: meshes in millimetres about the centre of their box, and their symmetries."""
+"""Object models in BOP's format: meshes in millimetres centred on their bounding box, and their symmetries."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from manitwin.render.raycast import merged
 from manitwin.twin.loaded_twin import Twin
 
 MM = 1000.0
-_INTO_FACE = 0.01  # of the way to its middle
+_INTO_FACE = 0.01  # share of the way to the face's centre
 COLOR_SAMPLES = 4000
 MOST_COLOR_APART = 24.0
-"""Of 255, the median distance in RGB of a surface and itself after a turn: what noise and shading of a capture make."""
+"""Of 255, the median RGB distance between a surface and its rotated copy that capture noise and shading explain."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class BopModel:
 
     @classmethod
     def of_twin(cls, folder: Path) -> BopModel:
-        """Read that of a twin's folder; raises TwinError."""
+        """Read the model from a twin's folder; raises TwinError."""
         twin = Twin(folder)
         mesh = merged(twin.visual)
         colors = np.concatenate([_vertex_colors(part) for part in twin.visual])
@@ -44,7 +44,7 @@ class BopModel:
 
     @property
     def center_m(self) -> np.ndarray:
-        """The centre of the box: BOP's origin, in the object frame."""
+        """The centre of the bounding box, BOP's origin, in the object frame."""
         return np.asarray(self.mesh.bounds.mean(0))
 
     @property
@@ -53,7 +53,7 @@ class BopModel:
         return transform(translation=self.center_m)
 
     def ply(self) -> bytes:
-        """Return the mesh as a binary PLY in millimetres about the centre of its box."""
+        """Return the mesh as a binary PLY in millimetres, centred on its bounding box."""
         moved = self.mesh.copy()
         moved.visual = trimesh.visual.ColorVisuals(moved, vertex_colors=self.colors)
         moved.apply_translation(-self.center_m)
@@ -68,8 +68,11 @@ class BopModel:
         return find_symmetries(self.mesh, np.random.default_rng(0))
 
     def info(self) -> dict[str, Any]:
-        """Return its entry in ``models_info.json``: box, diameter and symmetries of the shape, and, under names of its own, of
-        shape and colour: a printed box is symmetric in depth pictures only."""
+        """Return its entry in ``models_info.json``: bounding box, diameter and symmetries.
+
+        Symmetries of the shape have BOP's names, those of shape and colour additional names: a printed box is symmetric only in
+        depth pictures.
+        """
         low_mm = (self.mesh.bounds[0] - self.center_m) * MM
         extents_mm = self.mesh.extents * MM
         info: dict[str, Any] = {"diameter": _diameter(np.asarray(self.mesh.vertices)) * MM}
@@ -85,9 +88,10 @@ class BopModel:
         return info
 
     def _named(self, turns: list[np.ndarray], is_round: bool, suffix: str) -> dict[str, Any]:
-        """Return symmetries in BOP's form, mm about its origin; a body of revolution keeps the turns that swap its ends.
+        """Return symmetries in BOP's form, in mm about its origin; a body of revolution keeps a rotation that swaps its ends.
 
-        A ball is round about three axes, and keeps the turns of a cube: BOP takes each turn after each about an axis.
+        A ball has three continuous axes and keeps the rotations of a cube: BOP combines each rotation with those about each
+        axis.
         """
         found: dict[str, Any] = {}
         offset_mm = (self.symmetries.center_m - self.center_m) * MM
@@ -125,7 +129,7 @@ def _vertex_colors(part: trimesh.Trimesh) -> np.ndarray:
     corners = np.asarray(part.faces)
     face = np.zeros(len(part.vertices), int)
     face[corners.ravel()] = np.repeat(np.arange(len(corners)), 3)
-    # not at the corner itself: at a texture's very border its other side begins
+    # off the vertex itself, because a texture wraps around at its border
     at = _INTO_FACE * part.triangles_center[face] + (1 - _INTO_FACE) * np.asarray(part.vertices)
     return np.rint(255 * base_colors_at(part, face, at)).astype(np.uint8)
 

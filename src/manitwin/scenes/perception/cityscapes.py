@@ -1,4 +1,4 @@
-"""Cityscapes' layout: label and instance pictures beside the colours (github.com/mcordts/cityscapesScripts)."""
+"""Cityscapes format: label and instance pictures beside the colours (github.com/mcordts/cityscapesScripts)."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from manitwin.scenes.perception.splits import split_of
 
 INSTANCES_A_LABEL = 1000
 MOST_LABELS = 65535 // INSTANCES_A_LABEL
-"""Of an 16-bit ``instanceIds`` picture; with more labels they are written with 32 bits, as NumPy arrays."""
+"""Limit of a 16-bit ``instanceIds`` picture; with more labels, instance ids are written as 32-bit NumPy arrays."""
 
 
 def write_cityscapes(scenes: Iterable[SceneTruth], classes: Classes, out: Output, *, validation_share: float) -> None:
     """Write ``leftImg8bit/<split>/<scene>/`` and ``gtFine/<split>/<scene>/``.
 
-    ``*_labelIds.png`` has the class of each pixel, 8 bits, 16 where there are more than 255; ``*_instanceIds.png`` is label *
-    1000 + n of an object, n from 0, the label alone of stuff (``.npz`` of 32 bits where labels pass 65); ``*_partIds.png`` the
-    kind of part, 0 none. ``labels.json`` names all of them.
+    ``*_labelIds.png`` has the class of each pixel, in 8 bits, or 16 for more than 255 classes. ``*_instanceIds.png`` is label *
+    1000 + n for an object, n from 0, and the label alone for stuff (``.npz`` with 32 bits for more than 65 labels).
+    ``*_partIds.png`` has the kind of part, 0 for none. ``labels.json`` names all of them.
     """
     for scene in scenes:
         split = split_of(scene.record.scene_id, validation_share)

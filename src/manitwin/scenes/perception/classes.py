@@ -1,4 +1,4 @@
-"""The classes of a data set of scenes: categories of objects, names of their parts, and what is no object."""
+"""Classes of a data set of scenes: object categories, part names, and stuff."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from manitwin.scenes.perception.scene_truth import PictureTruth, SceneTruth
 
 BACKGROUND, FURNITURE = "background", "furniture"
 STUFF = (BACKGROUND, FURNITURE)
-"""What is no object: the floor and the backdrop, and the boxes that objects stand on."""
+"""Stuff classes: floor and backdrop, and the boxes that objects stand on."""
 
 
 @dataclass(frozen=True)
 class Classes:
-    """The categories and the parts (``category/name``) of all scenes, sorted; each numbered from 1.
+    """The categories and the parts (``category/name``) of all scenes, sorted and numbered from 1.
 
-    In pictures of classes ``STUFF`` come behind the categories.
+    In class pictures, ``STUFF`` follows the categories.
     """
 
     categories: tuple[str, ...]
@@ -37,7 +37,7 @@ class Classes:
 
     @classmethod
     def of(cls, scenes: Iterable[SceneTruth]) -> Classes:
-        """Return those of some scenes."""
+        """Return the classes of scenes."""
         categories, parts = set[str](), set[str]()
         for scene in scenes:
             categories |= {thing.category for thing in scene.record.objects}
@@ -55,7 +55,7 @@ class Classes:
         return table[picture.ids]
 
     def part_picture(self, scene: SceneTruth, picture: PictureTruth) -> np.ndarray:
-        """Return the kind of part ``(H, W) uint16`` at each pixel's centre, 0 where none is."""
+        """Return the kind of part ``(H, W) uint16`` at each pixel's centre, 0 for none."""
         table = np.zeros(int(max(picture.parts.max(), *scene.parts, 0)) + 1, np.uint16)
         for number, part in scene.parts.items():
             table[number] = self.part_ids[f"{part.category}/{part.name}"]

@@ -1,4 +1,4 @@
-"""COCO: instances and parts as run-length encoded masks, and panoptic pictures (cocodataset.org/#format-data)."""
+"""COCO format: instances and parts as run-length encoded masks, and panoptic pictures (cocodataset.org/#format-data)."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ DESCRIPTION = "Made by manitwin segmentation; every mask is that of the rays thr
 def write_coco(scenes: Iterable[SceneTruth], classes: Classes, out: Output, *, validation_share: float) -> None:
     """Write ``images/``, ``annotations/instances_<split>.json`` and ``annotations/parts_<split>.json``.
 
-    An annotation is an object's visible pixels, with ``visible_share``, ``amodal_box`` and ``cut_by_frame`` beside COCO's own
-    fields; one of a part names the ``instance_id`` of its object.
+    An annotation contains an object's visible pixels, with ``visible_share``, ``amodal_box`` and ``cut_by_frame`` in addition
+    to COCO's fields; that of a part names the ``instance_id`` of its object.
     """
     names = [{"id": number, "name": name, "supercategory": "object"} for name, number in classes.category_ids.items()]
     parts = [
@@ -68,7 +68,7 @@ def write_panoptic(scenes: Iterable[SceneTruth], classes: Classes, out: Output, 
 
 
 class _Annotations:
-    """The content of one annotation file while it grows."""
+    """The content of an annotation file under construction."""
 
     def __init__(self, categories: list[dict[str, Any]]):
         self.categories = categories
@@ -114,7 +114,7 @@ def _image(number: int, scene: SceneTruth, picture: PictureTruth, out: Output) -
 def _add_instances(
     to: _Annotations, image: int, scene: SceneTruth, picture: PictureTruth, classes: Classes
 ) -> dict[str, int]:
-    """Add an annotation for each object that is seen; returns their numbers by name."""
+    """Add an annotation for each visible object; return their numbers by name."""
     numbers: dict[str, int] = {}
     for thing in scene.record.objects:
         view = picture.views[thing.name]
@@ -161,7 +161,7 @@ def _annotation(number: int, image: int, mask: np.ndarray) -> dict[str, Any] | N
 
 
 def _segments(scene: SceneTruth, picture: PictureTruth, classes: Classes) -> tuple[list[dict[str, Any]], np.ndarray]:
-    """Return the segments that a picture shows, and the segment of each id: things keep theirs, stuff comes behind."""
+    """Return the segments of a picture, and the segment of each id: things keep their ids, stuff follows."""
     most = int(max(picture.ids.max(), *scene.ids.values(), 0))
     segment_of = np.full(most + 1, most + 2, np.uint32)
     segment_of[0] = most + 1

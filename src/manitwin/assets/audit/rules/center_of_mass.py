@@ -15,9 +15,7 @@ SLACK_M, SLACK_SHARE = 0.001, 0.01
 """Tolerance for a centre of mass outside the hull, in metres and as share of the longest side: hulls are rounded."""
 
 AWAY_SHARE = 0.1
-"""A centre of mass at exactly (0, 0, 0) counts as forgotten if that of the shape is farther away than this share of the longest
-side.
-"""
+"""A centre of mass at (0, 0, 0) counts as forgotten if the shape's is farther away, as share of the longest side."""
 SURFACE_SHARE = 0.45
 """It also counts as forgotten if that of the shape is this share of a side away along it, at the surface of a flat object."""
 

@@ -1,4 +1,4 @@
-"""COL: do the collision shapes stand for what is seen?"""
+"""COL rules: agreement of collision shapes with the visual geometry."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 
 SEEN_ONLY = frozenset({"visual", "vis", "marker", "ghost", "target", "goal"})
-"""Words in names of what shows where a thing shall be: it is meant to be no obstacle."""
+"""Words in names of pure markers, such as goal poses, which are not meant to collide."""
 
 BOX_SLACK_M, BOX_SLACK_SHARE = 0.003, 0.03
-"""How far a side of the collision's box may be from the visual's, and which share of the longest side."""
+"""Allowed distance between sides of the collision box and the visual box, in metres and as share of the longest side."""
 
 LEAST_KEPT = 0.5
-"""Of an open cavity: less, and what is put in stands on air."""
+"""Least share of an open cavity that collision shapes must leave open, so that objects can be put inside."""
 
 LEAST_OPENING_M = 0.01
-"""As wide as a pencil: a flute's bore is no place to put things in."""
+"""Least width of an opening, about that of a pencil; narrower ones, such as the bore of a flute, are ignored."""
 
 STICKS_OUT_M, STICKS_OUT_SHARE = 0.01, 0.05
-"""How far collision shapes may reach into the open air: a finger's thickness."""
+"""How far collision shapes may reach into open air: about the thickness of a finger."""
 
 UNCOVERED_M, UNCOVERED_SHARE = 0.005, 0.03
-"""How far the visual surface may be outside all collision shapes: fingers sink in by that."""
+"""How far the visual surface may lie outside all collision shapes; fingers penetrate it by this much."""
 
 CONVEX_SHARE = 0.97
-"""A mesh that fills less of its convex hull is not convex."""
+"""A mesh that fills a smaller share of its convex hull is concave."""
 
 MANY_SHAPES, MANY_VERTICES = 128, 255
-"""PhysX cooks hulls of at most 255 vertices (its manual); hundreds of shapes make every contact slow."""
+"""PhysX cooks hulls with at most 255 vertices (its manual); hundreds of shapes make every contact slow."""
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an asset that may move and has no collision shapes; what stands fast, or is a mark, is there to be seen."""
+    """Report a movable asset without collision shapes, unless it is a marker."""
     if measured.asset.collision or measured.visual is None or measured.asset.static or measured.asset.partial:
         return
-    if measured.asset.inertial.mass_kg == 0:  # MAS002 says so; Bullet lets it stand fast
+    if measured.asset.inertial.mass_kg == 0:  # reported by MAS002; Bullet treats it as static
         return
     named = re.split(r"[^a-z]+", f"{measured.asset.name} {measured.asset.path.stem}".lower())
     if not SEEN_ONLY & set(named):
@@ -49,7 +49,7 @@ def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def flat(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of shapes without volume."""
+    """Report shapes without volume."""
     if not measured.shapes.flat:
         return
     shapes = [measured.asset.collision[index] for index in measured.shapes.flat]
@@ -61,10 +61,10 @@ def flat(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def box_differs(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a collision whose box is not that of the visual."""
+    """Report a collision box that differs from the visual box."""
     if measured.visual is None or measured.collision is None or measured.asset.static:
-        return  # of what stands fast often only what is met collides, such as a table's top
-    if measured.asset.inertial.mass_kg == 0:  # it stands fast in Bullet: the ground is a slab under what is seen
+        return  # static assets often collide only where they are touched, such as a table's top
+    if measured.asset.inertial.mass_kg == 0:  # static in Bullet: a ground is often a slab below the visible surface
         return
     seen, felt = np.asarray(measured.visual.bounds), np.asarray(measured.collision.bounds)
     apart = float(np.abs(seen - felt).max())
@@ -77,18 +77,18 @@ def box_differs(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def has_convex_pieces(measured: MeasuredAsset) -> bool:
-    """Tell whether the collision is made of convex pieces, in the place of what is seen: only then is it what it looks."""
+    """Return whether the collision consists of convex pieces in the same box as the visual, so that both are comparable."""
     if any(shape.as_drawn for shape in measured.asset.collision) or measured.once(_drawn):
         return False
     return bool(len(measured.shapes)) and not measured.complaints(box_differs) and not measured.complaints(not_convex)
 
 
 def filled_opening(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a container that the collision shapes fill."""
+    """Report a container that the collision shapes fill."""
     air = measured.air
     if measured.asset.static or air is None or air.opens is None or not has_convex_pieces(measured):
         return
-    if measured.asset.partial:  # a link of a robot is hollow where the next one sits
+    if measured.asset.partial:  # a link of a robot is hollow where the next one is mounted
         return
     across = np.ptp(air.points_m[air.hollow], axis=0)[np.abs(air.opens) < 0.5]
     if not len(across) or float(across.min()) < LEAST_OPENING_M:
@@ -102,7 +102,7 @@ def filled_opening(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def sticks_out(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of collision shapes that reach far into the open air beside the object, hollows of containers apart."""
+    """Report collision shapes that reach far into open air beside the object, except in hollows of containers."""
     air = measured.air
     if measured.asset.static or air is None or not has_convex_pieces(measured):
         return
@@ -122,14 +122,14 @@ def sticks_out(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def stands_for_object(measured: MeasuredAsset) -> bool:
-    """Tell whether fingers meet the collision shapes where they would meet the object."""
+    """Return whether fingers would touch the collision shapes where they would touch the object."""
     return (
         has_convex_pieces(measured) and not measured.complaints(filled_opening) and not measured.complaints(sticks_out)
     )
 
 
 def uncovered(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of visible surface that nothing collides for."""
+    """Report visible surface that is not covered by collision shapes."""
     if measured.visual is None or measured.asset.static or not has_convex_pieces(measured):
         return
     limit = max(UNCOVERED_M, UNCOVERED_SHARE * measured.longest_m)
@@ -145,7 +145,7 @@ def uncovered(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def not_convex(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of concave triangle meshes that are to be taken as they are."""
+    """Report concave triangle meshes that are to be used unchanged."""
     concave = [
         shape for shape, volume in _with_hull_volume(measured) if not shape.convex and _is_concave(shape, volume)
     ]
@@ -178,7 +178,7 @@ def _drawn(measured: MeasuredAsset) -> list[CollisionShape]:
 
 
 def costly(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of more shapes, or of convex hulls of more vertices, than engines take well."""
+    """Report more shapes, or convex hulls with more vertices, than engines handle well."""
     shapes = measured.asset.collision
     if len(shapes) > MANY_SHAPES:
         yield Complaint(f"{len(shapes)} collision shapes: every contact becomes slow", values={"shapes": len(shapes)})

@@ -1,4 +1,4 @@
-"""GRA: can a gripper do what the annotated contacts say?"""
+"""GRA rules on annotated contacts: whether a gripper can execute them."""
 
 from __future__ import annotations
 
@@ -20,23 +20,27 @@ from manitwin.geometry.poses import transform_points
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
 
 REACH_M = 0.02
-"""How far from the surface the point between the fingertips may be: a pad's length."""
+"""Largest distance of the point between the fingertips from the surface: the length of a pad."""
 
 BELOW_M = 0.005
-"""How far below the object's lowest point a contact frame may be, and a palm below the plane."""
+"""How far a contact frame may be below the lowest point of the object, and a palm below the support plane."""
 
 SLACK_M = 0.002
-"""Of a gripper's opening: what its own clearance and rounding explain."""
+"""Tolerance of a gripper's opening for clearance and rounding."""
 
 PAD_M = 0.009
-"""Half of a fingertip pad (Panda: 8.75 by 9.25 mm): what its middle misses, its edge may still touch."""
+"""Half of a fingertip pad (Panda: 8.75 by 9.25 mm): its edge may touch what its centre misses."""
 
 _CLEAR_M = 0.0002
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """The contact frames of an asset that are frames: points between the fingertips ``(N, 3)``, heights above the lowest."""
+    """The valid contact frames of an asset, with points between the fingertips ``(N, 3)`` and measurements ``(N,)``.
+
+    ``below`` marks frames below the lowest point of the object, ``distance_m`` is the distance to the surface, and ``closings``
+    the result of closing the default gripper.
+    """
 
     frames: tuple[AnnotatedFrame, ...]
     points_m: np.ndarray
@@ -47,12 +51,12 @@ class Contacts:
 
 @cache
 def default_gripper() -> Gripper:
-    """Return the gripper that contact frames are held against where they name none: the paper's."""
+    """Return the gripper for contact frames that name none: the one of the paper."""
     return load_gripper("panda")
 
 
 def contacts(measured: MeasuredAsset) -> Contacts | None:
-    """Measure the contact frames; None where there are none, or nothing to hold them against."""
+    """Measure the contact frames; None if there are none, or no geometry of plausible size to measure them against."""
     frames = tuple(f for f in measured.asset.frames if f.kind == "contact" and is_sound(np.asarray(f.frame_to_asset)))
     if not frames or not len(measured.samples) or is_of_wrong_size(measured):
         return None
@@ -75,7 +79,7 @@ def contacts(measured: MeasuredAsset) -> Contacts | None:
 
 
 def distance_to_matter(measured: MeasuredAsset, points: np.ndarray, exact_beyond_m: float) -> np.ndarray:
-    """Return the distance of points ``(N, 3)`` to the surface, 0 inside the object."""
+    """Return the distances of points ``(N, 3)`` to the surface, 0 inside the object."""
     outside = ~measured.shapes.within(points)
     distance = np.zeros(len(points))
     if outside.any():
@@ -84,7 +88,7 @@ def distance_to_matter(measured: MeasuredAsset, points: np.ndarray, exact_beyond
 
 
 def below_object(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of contact frames below the object's lowest point."""
+    """Report contact frames below the lowest point of the object."""
     found = measured.once(contacts)
     if found is not None and found.below.any():
         deepest = float((measured.lowest_m - found.points_m @ measured.up).max())
@@ -92,7 +96,7 @@ def below_object(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def out_of_reach(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of contact frames beside the object, where fingers close on nothing."""
+    """Report contact frames beside the object, where fingers close on nothing."""
     found = measured.once(contacts)
     if found is None:
         return
@@ -105,7 +109,7 @@ def out_of_reach(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def too_wide(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of contact frames about which the object is wider than the gripper opens."""
+    """Report contact frames at which the object is wider than the opening of the gripper."""
     found = measured.once(contacts)
     if found is None:
         return
@@ -121,7 +125,7 @@ def too_wide(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def through_table(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain where every contact frame comes from below at rest: the palm would be in the table."""
+    """Report if every contact frame approaches from below at rest, so that the palm would be in the table."""
     found = measured.once(contacts)
     blocked, directed = measured.once(blocked_contacts)
     if found is not None and len(directed) and blocked.sum() == len(directed):
@@ -129,7 +133,7 @@ def through_table(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def some_through_table(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Note contact frames that come from below at rest, where others do not."""
+    """Note contact frames that approach from below at rest, if others do not."""
     found = measured.once(contacts)
     blocked, directed = measured.once(blocked_contacts)
     if found is not None and 0 < blocked.sum() < len(directed):
@@ -137,7 +141,7 @@ def some_through_table(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def blocked_contacts(measured: MeasuredAsset) -> tuple[np.ndarray, np.ndarray]:
-    """Return which contact frames ``(N,) bool`` have their palm in the table, and the indices of those with an approach."""
+    """Return which contact frames have their palm in the table ``(N,) bool``, and the indices of those with an approach."""
     found = measured.once(contacts)
     if found is None:
         return np.zeros(0, dtype=bool), np.zeros(0, dtype=int)
@@ -151,7 +155,7 @@ def blocked_contacts(measured: MeasuredAsset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def under_table(measured: MeasuredAsset, palms: np.ndarray) -> np.ndarray:
-    """Tell which palms ``(N, 3)`` are below the plane in every declared pose at rest; as it stands where none is declared."""
+    """Return which palms ``(N, 3)`` are below the plane in every declared resting pose, or as the asset stands if it has none."""
     heights = [palms @ measured.up - measured.lowest_m]
     rests = [rest for rest in measured.asset.rests if is_sound(np.asarray(rest, float))]
     if rests:
@@ -218,9 +222,9 @@ RULES = (
 
 @dataclass(frozen=True)
 class Closings:
-    """For every grasp: whether a line between the open fingers meets the object, and the least opening ``(N,)`` m.
+    """For each grasp, whether a line between the open fingers meets the object, and the least opening ``(N,)`` m.
 
-    ``least_opening_m`` is infinite where no opening lets both fingertips stand free with the object between them.
+    ``least_opening_m`` is infinite if no opening leaves both fingertips free with the object between them.
     """
 
     meets: np.ndarray
@@ -232,7 +236,7 @@ def close_on(
 ) -> Closings:
     """Close two fingers on shapes, about ``points (N, 3)`` between the fingertips along ``closing (N, 3)``.
 
-    Five lines a grasp, in the middle of the pad and at its edges; the best of them counts.
+    Five lines for each grasp are tested, at the centre of the pad and at its edges; the best one counts.
     """
     lateral = np.cross(approach, closing)
     ahead = np.cross(closing, lateral)
@@ -248,9 +252,10 @@ def close_on(
 
 
 def _line(enter: np.ndarray, leave: np.ndarray, opening_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return whether matter lies between the fingers, and the least opening at which they stand free around some.
+    """Return whether matter lies between the fingers, and the least opening at which they are free with matter between them.
 
-    The fingertips are at +s and -s; s is tried just beyond every end of an interval, where a finger first stands free.
+    The fingertips are at +s and -s. Candidates for s are just beyond the ends of the intervals, where a finger first becomes
+    free.
     """
     hit = enter < leave
     enter, leave = np.where(hit, enter, np.inf), np.where(hit, leave, np.inf)

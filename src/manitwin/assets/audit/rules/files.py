@@ -1,4 +1,4 @@
-"""FIL: is all there, once, and as it was written?"""
+"""FIL rules: completeness and integrity of the files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manitwin.errors import TwinError
 from manitwin.twin.store import RECORD, sha256_of_untrusted, verify_record
 
 LARGEST_COORDINATE_M = 1e6
-"""Beyond it nothing can be measured in double precision."""
+"""Larger coordinates cannot be measured in double precision."""
 
 _LEAST_BYTES = 1024
 _GEOMETRY = frozenset({".obj", ".glb", ".gltf", ".stl", ".ply", ".dae", ".usd", ".usdc", ".usda", ".usdz"})
@@ -23,12 +23,12 @@ _PICTURES = frozenset({".png", ".jpg", ".jpeg", ".webp"})
 
 
 def unreadable(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Say nothing: what could be measured could be read. ``audit.check`` raises this for what could not."""
+    """Placeholder check: unreadable assets never reach the rules, and ``audit.check`` creates these findings itself."""
     yield from ()
 
 
 def no_geometry(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an asset without anything to see or to touch."""
+    """Report an asset without visual and collision geometry."""
     if measured.body is None:
         names = measured.asset.missing_files
         named = ", ".join(repr(name) for name in names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
@@ -37,17 +37,17 @@ def no_geometry(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def wild_geometry(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of coordinates that nothing can be measured of."""
+    """Report coordinates that cannot be measured."""
     for kind, meshes in (("visual", measured.asset.visual), ("collision", measured.asset.collision)):
         for mesh in meshes:
             vertices = np.asarray(mesh.vertices, float)
-            if len(vertices) and not (np.abs(vertices) <= LARGEST_COORDINATE_M).all():  # NaN is not less either
+            if len(vertices) and not (np.abs(vertices) <= LARGEST_COORDINATE_M).all():  # also false for NaN
                 yield Complaint(f"a {kind} mesh has coordinates that are no finite number of metres below 1e6")
                 break
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of files that are named and not there."""
+    """Report files that are named and do not exist."""
     names = measured.asset.missing_files
     if names:
         more = f" and {len(names) - 4} more" if len(names) > 4 else ""
@@ -55,7 +55,7 @@ def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def duplicates(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of meshes or textures that are the same bytes under two names."""
+    """Report meshes or textures with the same content under two names."""
     by_size: dict[tuple[bool, int], list[Path]] = defaultdict(list)
     for path in measured.asset.files:
         suffix = path.suffix.lower()
@@ -72,7 +72,7 @@ def duplicates(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def altered(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a twin whose files are not those that its record names."""
+    """Report a twin whose files differ from its record."""
     if measured.record is None or measured.asset.missing_files:
         return
     path = measured.asset.path
@@ -84,14 +84,14 @@ def altered(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def remarks(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Pass on what the reader had to note."""
+    """Pass on the remarks of the reader."""
     for remark in measured.asset.remarks:
         if remark not in measured.asset.lenient:
             yield Complaint(remark)
 
 
 def taken_leniently(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of what was read though a loader that goes by the letter would refuse it, or not find it."""
+    """Report content that a strict loader would refuse, or not find."""
     for said in measured.asset.lenient:
         yield Complaint(said)
 

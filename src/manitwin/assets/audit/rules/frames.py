@@ -1,4 +1,4 @@
-"""FRM: are annotated frames frames?"""
+"""FRM rules: validity of annotated frames."""
 
 from __future__ import annotations
 
@@ -13,19 +13,21 @@ from manitwin.assets.audit.fix import orthonormalise_frames
 from manitwin.assets.audit.measured import MeasuredAsset
 
 NOT_ORTHONORMAL = 1e-3
-"""The largest entry of R^T R - I that rounding explains: files hold four to seven digits."""
+"""Largest entry of R^T R - I that rounding explains: files hold four to seven digits."""
 
 SAME_POSE = 1e-6
-"""Entries of two matrices that are the same frame written twice, metres or cosines."""
+"""Entries of two matrices of the same frame may differ by this, in metres or cosines."""
 
 AWAY_M, AWAY_SHARE = 0.03, 0.2
-"""How far from the surface a functional or target frame may be, and which share of the longest side."""
+"""Largest distance of a functional or target frame from the surface, in metres and as share of the longest side."""
 
 
 @dataclass(frozen=True)
 class Frames:
-    """Every matrix of an asset: annotations, rests and grasps. ``finite``: it is a transform; ``left_handed``: it mirrors;
-    ``off``: the largest entry of R^T R - I; all ``(N,)``, the latter two of those that are finite, else False and 0.
+    """Checks of all matrices of an asset (annotations, rests and grasps), each ``(N,)``.
+
+    ``finite``: it is an affine transform of finite numbers. ``left_handed``: its axes are mirrored. ``off``: the largest entry
+    of R^T R - I. The latter two are False and 0 for matrices that are not finite.
     """
 
     names: tuple[str, ...]
@@ -40,7 +42,7 @@ class Frames:
 
 
 def frames_of(matrices: Sequence[np.ndarray], names: Sequence[str] = ()) -> Frames:
-    """Examine matrices, which should be ``(4, 4)``."""
+    """Check matrices, which should be ``(4, 4)``."""
     poses = np.full((len(matrices), 4, 4), np.nan)
     for index, matrix in enumerate(matrices):
         if np.shape(matrix) == (4, 4):
@@ -53,7 +55,7 @@ def frames_of(matrices: Sequence[np.ndarray], names: Sequence[str] = ()) -> Fram
 
 
 def all_frames(measured: MeasuredAsset) -> Frames:
-    """Examine all matrices of an asset, with a name of each for a person."""
+    """Check all matrices of an asset, with a readable name for each."""
     asset = measured.asset
     matrices = [frame.frame_to_asset for frame in asset.frames] + list(asset.rests)
     names = [f"{frame.kind} {frame.number}" for frame in asset.frames]
@@ -65,24 +67,24 @@ def all_frames(measured: MeasuredAsset) -> Frames:
 
 
 def is_sound(pose: np.ndarray) -> bool:
-    """Tell whether a pose is a rigid transform."""
+    """Return whether a pose is a rigid transform."""
     return bool(frames_of([pose]).sound[0])
 
 
 def not_finite(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of matrices that are no transforms at all."""
+    """Report matrices that are not transforms."""
     frames = measured.once(all_frames)
     yield from _complain(_names(frames, ~frames.finite), "no 4x4 transform of finite numbers")
 
 
 def left_handed(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of mirrored frames."""
+    """Report mirrored frames."""
     frames = measured.once(all_frames)
     yield from _complain(_names(frames, frames.left_handed), "left-handed: the axes are mirrored")
 
 
 def not_orthonormal(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of axes that are not of unit length or not perpendicular."""
+    """Report axes that are not of unit length or not perpendicular."""
     frames = measured.once(all_frames)
     wrong = ~frames.left_handed & (frames.off > NOT_ORTHONORMAL)
     yield from _complain(
@@ -95,7 +97,7 @@ def _names(frames: Frames, which: np.ndarray) -> list[str]:
 
 
 def duplicates(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of annotations of one kind that are the same frame."""
+    """Report annotations of one kind with the same frame."""
     seen: dict[tuple[str, bytes], str] = {}
     twice = []
     for frame in measured.asset.frames:
@@ -111,7 +113,7 @@ def duplicates(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def far_from_object(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of functional and target frames that float away from the object."""
+    """Report functional and target frames far from the object."""
     frames = [frame for frame in measured.asset.frames if frame.kind in ("functional", "target")]
     finite = frames_of([frame.frame_to_asset for frame in frames]).finite
     frames = [frame for frame, is_finite in zip(frames, finite, strict=True) if is_finite]
@@ -120,7 +122,7 @@ def far_from_object(measured: MeasuredAsset) -> Iterator[Complaint]:
     limit = max(AWAY_M, AWAY_SHARE * measured.longest_m)
     points = np.array([frame.frame_to_asset[:3, 3] for frame in frames], float)
     distance = measured.distance_m(points, limit)
-    # a frame in the middle of a bowl or of its opening is far from its wall, and where it should be
+    # a frame in the middle of a bowl or its opening is far from the wall, and correct
     if len(measured.hull):
         distance = np.where(measured.hull.within(points, limit), 0.0, distance)
     far = [f"{f.kind} {f.number}" for f, away in zip(frames, distance, strict=True) if away > limit]

@@ -1,4 +1,4 @@
-"""FRI: friction and bounce that two dry solids can have."""
+"""FRI rules: plausibility of friction and restitution for dry solids."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ LARGEST = 2.0
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an asset that declares no friction."""
-    if measured.asset.static or not measured.asset.collision:  # nothing of it rubs
+    """Report an asset that declares no friction."""
+    if measured.asset.static or not measured.asset.collision:  # without collision shapes, friction has no effect
         return
     contact = measured.asset.contact
     if contact.friction_static is None and contact.friction_dynamic is None and not contact.of_others:
@@ -23,7 +23,7 @@ def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def out_of_range(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of coefficients that no pair of dry solids has; none at all is what castors of robots are given."""
+    """Report coefficients that are impossible for dry solids; 0 is allowed for parts of robots, whose castors often have it."""
     contact, of_a_robot = measured.asset.contact, measured.asset.partial
     for name, value in (("static", contact.friction_static), ("dynamic", contact.friction_dynamic)):
         if value is not None and not _possible(value) and not (of_a_robot and value == 0):
@@ -38,7 +38,7 @@ def _possible(value: float) -> bool:
 
 
 def dynamic_above_static(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of more friction when sliding than at rest."""
+    """Report a dynamic friction above the static friction."""
     static, dynamic = measured.asset.contact.friction_static, measured.asset.contact.friction_dynamic
     if static is None or dynamic is None or not (_possible(static) and _possible(dynamic)):
         return
@@ -50,7 +50,7 @@ def dynamic_above_static(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def restitution_out_of_range(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a bounce that takes or gives energy from nowhere."""
+    """Report a restitution outside of 0 to 1."""
     restitution = measured.asset.contact.restitution
     if restitution is not None and not 0 <= restitution <= 1:
         yield Complaint(f"the restitution is {restitution:g}, it is 0 to 1", values={"restitution": restitution})

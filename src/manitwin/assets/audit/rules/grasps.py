@@ -1,4 +1,4 @@
-"""GRA: did the grasps hold, and are they grasps of this object?"""
+"""GRA rules on grasp sets: whether grasps held, and whether they belong to this object."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from manitwin.assets.audit.rules.scale import is_of_wrong_size
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
 
 PALM_REACH_M = 0.08
-"""How far the fingertips of hands may be from the surface that hold with more than these."""
+"""Largest distance of the fingertips from the surface for hands that also hold with other parts than the fingertips."""
 
 TRIED = 64
-"""Grasps of a set that are looked at, evenly spread over it."""
+"""Grasps of a set that are examined, evenly spread over it."""
 
 SHARE_OFF = 0.1
-"""Of the grasps that are said to hold: more of them off the object, and the set belongs to another mesh, scale or frame."""
+"""Largest share of held grasps off the object; above it, the set belongs to another mesh, scale or frame."""
 
 
 def none_held(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an asset whose grasps have been tried, and none held."""
+    """Report an asset whose grasps were tried and none held."""
     counts = {grasps.gripper: (int(np.sum(grasps.held)), len(grasps.held)) for grasps in measured.asset.grasps}
     tried = {gripper: count for gripper, (_, count) in counts.items() if count}
     if tried and not any(held for held, _ in counts.values()):
@@ -36,7 +36,7 @@ def none_held(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def held_sets(measured: MeasuredAsset) -> list[tuple[AnnotatedGrasps, np.ndarray, np.ndarray, Gripper | None]]:
-    """Return each set with some of its held grasps that are frames: indices, the points between fingertips, the gripper."""
+    """Return, for each set, a sample of its valid held grasps: indices, points between the fingertips, and the gripper."""
     found = []
     for grasps in measured.asset.grasps:
         held = np.flatnonzero(np.asarray(grasps.held, bool))
@@ -55,7 +55,7 @@ def _shipped(gripper: str) -> Gripper | None:
 
 
 def grasps_off_object(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of sets of held grasps whose fingertips are not at the object."""
+    """Report sets of held grasps whose fingertips are away from the object."""
     if not len(measured.samples) or is_of_wrong_size(measured):
         return
     for grasps, held, points, gripper in measured.once(held_sets):
@@ -63,7 +63,8 @@ def grasps_off_object(measured: MeasuredAsset) -> Iterator[Complaint]:
         poses, widths = np.asarray(grasps.gripper_to_asset, float)[held], np.asarray(grasps.width_m, float)[held]
         aside = poses[:, :3, 0] * np.nan_to_num(widths, posinf=0.0)[:, None] / 2
         off = np.ones(len(points), bool)
-        for fingers in (points, points + aside, points - aside):  # between those around a mug is its hollow
+        # the point between the fingers around a mug is in its hollow
+        for fingers in (points, points + aside, points - aside):
             off[off] = distance_to_matter(measured, fingers[off], reach) > reach
         if off.mean() > SHARE_OFF:
             yield Complaint(
@@ -74,7 +75,7 @@ def grasps_off_object(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def grasps_too_wide(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of held grasps that are wider than their gripper opens."""
+    """Report held grasps that are wider than the opening of their gripper."""
     for grasps, held, _, gripper in measured.once(held_sets):
         if gripper is None or gripper.kind != "parallel":
             continue
@@ -89,7 +90,7 @@ def grasps_too_wide(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def all_through_table(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of sets of held grasps that all come from below at rest."""
+    """Report sets of held grasps that all approach from below at rest."""
     if measured.bounds is None or is_of_wrong_size(measured):
         return
     for grasps, held, _, _ in measured.once(held_sets):

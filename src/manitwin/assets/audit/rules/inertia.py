@@ -1,4 +1,4 @@
-"""INE: does the inertia belong to that shape and mass?"""
+"""INE rules: plausibility of the inertia for shape and mass."""
 
 from __future__ import annotations
 
@@ -17,27 +17,30 @@ RELATIVE = 1e-4
 """Rounding: files often hold six digits."""
 
 FACTOR = 3.0
-"""How far the moments may be outside those of a filled and of a thin-walled body of that shape: a hammer's head, a
-ballast or a motor moves matter within the shape. Our choice: among 25 real objects and their exports it reports none."""
+"""Factor by which moments may exceed the range of a filled and of a thin-walled body of the shape.
 
-_NEWTON_STEPS, _CENTRED = 100, 1e-4  # of the size: how near the centre comes to the declared one
+A hammer head, ballast or motor concentrates mass within the shape. Our choice: none of 25 real objects and their exports is
+reported.
+"""
+
+_NEWTON_STEPS, _CENTRED = 100, 1e-4  # of the size: convergence tolerance of the centre
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a mass without an inertia; where its centre is not declared either, that is part of it.
+    """Report a mass without an inertia, and a missing centre of mass with it.
 
-    MJCF says masses or densities of shapes, from which MuJoCo's compiler computes both (``inertiafromgeom``).
+    MJCF states masses or densities of shapes, from which MuJoCo's compiler computes both (``inertiafromgeom``).
     """
     inertial = measured.asset.inertial
     if measured.asset.format == "mjcf":
         return
-    if inertial.mass_kg and inertial.inertia_kg_m2 is None:  # of no mass, which MAS002 says, there is none
+    if inertial.mass_kg and inertial.inertia_kg_m2 is None:  # without a mass (MAS002) there is no inertia
         centre = " and no centre of mass: they are" if inertial.center_of_mass_m is None else ": it is"
         yield Complaint(f"a mass is declared, but no inertia{centre} left to the simulator")
 
 
 def principal_moments(inertia: np.ndarray) -> np.ndarray | None:
-    """Return the principal moments of an inertia ``(3, 3)``, the smallest first; None where it is no symmetric matrix."""
+    """Return the principal moments of an inertia ``(3, 3)``, smallest first; None if it is not a finite symmetric matrix."""
     if inertia.shape != (3, 3) or not np.isfinite(inertia).all():
         return None
     if np.abs(inertia - inertia.T).max() > RELATIVE * max(np.abs(inertia).max(), 1e-300):
@@ -46,7 +49,7 @@ def principal_moments(inertia: np.ndarray) -> np.ndarray | None:
 
 
 def not_positive_definite(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a tensor that is not symmetric, finite and positive definite."""
+    """Report a tensor that is not symmetric, finite and positive definite."""
     inertia = measured.asset.inertial.inertia_kg_m2
     if inertia is None or (
         measured.asset.inertial.mass_kg == 0 and not inertia.any()
@@ -65,12 +68,12 @@ def not_positive_definite(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def is_placeholder(inertia: np.ndarray | None) -> bool:
-    """Tell whether an inertia is the identity, as templates hold it."""
+    """Return whether an inertia is the identity, as in templates."""
     return inertia is not None and inertia.shape == (3, 3) and bool(np.allclose(inertia, np.eye(3), atol=1e-9))
 
 
 def placeholder(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an inertia of 1.0 about all axes that the shape does not have."""
+    """Report an inertia of 1.0 about all axes that is implausible for the shape."""
     inertia = measured.asset.inertial.inertia_kg_m2
     if not is_placeholder(inertia) or measured.asset.inertial.mass_kg == 0:
         return
@@ -81,7 +84,7 @@ def placeholder(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def triangle(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of moments of which one is more than the sum of the other two."""
+    """Report moments that violate the triangle inequality."""
     moments = _sound_moments(measured)
     if moments is not None and moments[2] > (moments[0] + moments[1]) * (1 + RELATIVE):
         yield Complaint(
@@ -91,10 +94,10 @@ def triangle(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def plausible_moments(measured: MeasuredAsset) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the least and most principal moments ``(3,)`` kg m2 of the declared mass in this shape, without any slack.
+    """Return the least and largest principal moments ``(3,)`` kg m2 of the declared mass in this shape, without tolerance.
 
-    Between a thin shell of the surface, the collision shapes filled, the convex hull filled, the surface filled where it is
-    closed, and matter on the surface that is as even as the declared centre of mass lets it be. None without a mass or a shape.
+    The range covers a thin shell of the surface, the filled collision shapes, the filled convex hull, the filled surface if it
+    is closed, and surface mass distributed as evenly as the declared centre of mass allows. None without a mass or a shape.
     """
     mass, surface = positive_mass_kg(measured), measured.surface
     if mass is None or surface is None:
@@ -111,10 +114,11 @@ def plausible_moments(measured: MeasuredAsset) -> tuple[np.ndarray, np.ndarray] 
 
 
 def leaning_inertia_per_kg_m2(points: np.ndarray, center_m: np.ndarray | None) -> np.ndarray | None:
-    """Return the inertia ``(3, 3)`` m^2 about a centre ``(3,)`` m of matter on points ``(N, 3)``, as even as that lets it be.
+    """Return the inertia ``(3, 3)`` m^2, about ``center_m (3,)``, of unit mass on points ``(N, 3)``, as even as possible.
 
-    A hammer's steel head and wooden handle have less of it than a hammer of one matter. None without a centre, and where none of
-    the ways to spread it has that centre. Source: the distribution of most entropy with a given mean, by Newton's method.
+    It accounts for uneven mass: a hammer with a steel head and a wooden handle has a smaller inertia than one of a single
+    material. None without a centre, or if no distribution on the points has it. Source: the maximum entropy distribution with a
+    given mean, by Newton's method.
     """
     if center_m is None or not len(points) or not np.isfinite(center_m).all():
         return None
@@ -136,7 +140,7 @@ def leaning_inertia_per_kg_m2(points: np.ndarray, center_m: np.ndarray | None) -
 
 
 def magnitude(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of principal moments that no such body of that mass has."""
+    """Report principal moments that are implausible for shape and mass."""
     moments, band = _sound_moments(measured), plausible_moments(measured)
     if moments is None or band is None or is_of_wrong_size(measured) or measured.asset.inertial.computed:
         return

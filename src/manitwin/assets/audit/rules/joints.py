@@ -1,4 +1,4 @@
-"""JNT: do the joints move, and between limits that they can have?"""
+"""JNT rules: validity of joint axes and limits."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from manitwin.assets.joints import ABOUT_AN_AXIS, LIMITED, TURNS, DeclaredJoint
 _NO_LENGTH = 1e-9
 _NOT_OF_LENGTH_ONE = 1e-3
 TWO_TURNS, MOST_DEGREES = 4 * math.pi, 720.0
-"""Wrists of robots turn by up to two turns each way. A limit above 4 pi, and up to 720, was meant in degrees."""
+"""Robot wrists turn by up to two turns in each direction. A limit above 4 pi, and up to 720, was meant in degrees."""
 _MULTIPLE_OF_PI = 1e-3
-"""In multiples of pi: a limit so near to a whole one is a wide range in radians, not degrees."""
+"""In multiples of pi: a limit this close to a whole multiple is a wide range in radians, not in degrees."""
 DEGREES_FOR_RADIANS = math.radians(math.pi)
-"""Half a turn in radians, where MuJoCo takes the number for degrees."""
+"""Half a turn in radians that MuJoCo read as degrees."""
 _RADIAN_FRACTIONS = tuple(math.radians(math.pi * part) for part in (1.0, 0.75, 2 / 3, 0.5, 1 / 3, 0.25))
 _NEAR_FRACTION = 5e-3
-"""The relative difference up to which a limit counts as one of these parts of pi."""
+"""Relative difference up to which a limit counts as one of these fractions of pi."""
 MOST_NAMED = 3
 
 
 def no_axis(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of joints about an axis that has no direction."""
+    """Report joints whose axis has no direction."""
     yield from _of_joints(measured, _lacks_direction, lambda j: f"joint {j.name!r} has the axis {_three(j)}")
 
 
 def _lacks_direction(joint: DeclaredJoint) -> bool:
     if joint.kind not in ABOUT_AN_AXIS or joint.axis is None:
         return False
-    return not _length(joint) > _NO_LENGTH  # NaN is not above either
+    return not _length(joint) > _NO_LENGTH  # also true for NaN
 
 
 def _length(joint: DeclaredJoint) -> float:
@@ -42,7 +42,7 @@ def _length(joint: DeclaredJoint) -> float:
 
 
 def axis_not_of_length_one(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of axes that some engines normalize and others do not."""
+    """Report axes that are not of unit length, which some engines normalize and others do not."""
 
     def applies(joint: DeclaredJoint) -> bool:
         if joint.kind not in ABOUT_AN_AXIS or joint.axis is None or _lacks_direction(joint):
@@ -53,7 +53,7 @@ def axis_not_of_length_one(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def limits_inverted(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of joints whose lower limit is above the upper one, or no number."""
+    """Report joints whose lower limit is above the upper one, or not a number."""
 
     def applies(joint: DeclaredJoint) -> bool:
         if joint.kind == "continuous" or joint.lower is None or joint.upper is None:
@@ -66,7 +66,7 @@ def limits_inverted(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def limits_in_degrees(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of limits that are radians by their format and degrees by their numbers, or the other way round."""
+    """Report limits that look like degrees in a format with radians, or like radians in a format with degrees."""
     in_degrees, radians = measured.asset.format in ("mjcf", "usd"), measured.asset.format != "usd"
 
     def applies(joint: DeclaredJoint) -> bool:
@@ -98,7 +98,7 @@ def _is_multiple_of_pi(end: float) -> bool:
 
 
 def limits_missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of joints of a URDF that must have limits and have none."""
+    """Report URDF joints without the limits that their type requires."""
     if measured.asset.format not in ("urdf", "embodiedgen"):
         return
 
@@ -109,7 +109,7 @@ def limits_missing(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def cannot_move(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of joints whose two limits are the same number."""
+    """Report joints with equal limits."""
 
     def applies(joint: DeclaredJoint) -> bool:
         return (
@@ -125,7 +125,7 @@ def cannot_move(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def follows_none(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of joints that mimic one which the file does not have."""
+    """Report joints that mimic a joint which does not exist."""
     names = {joint.name for joint in measured.asset.joints}
 
     def applies(joint: DeclaredJoint) -> bool:
@@ -139,7 +139,7 @@ def follows_none(measured: MeasuredAsset) -> Iterator[Complaint]:
 def _of_joints(
     measured: MeasuredAsset, applies: Callable[[DeclaredJoint], bool], said: Callable[[DeclaredJoint], str]
 ) -> Iterator[Complaint]:
-    """Complain once of all joints that ``applies`` tells, the first few by what is ``said`` of each."""
+    """Report all joints for which ``applies`` is true in one complaint, with the text of ``said`` for the first few."""
     found: Sequence[DeclaredJoint] = [joint for joint in measured.asset.joints if applies(joint)]
     if found:
         more = f"; and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""

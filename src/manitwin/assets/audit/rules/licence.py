@@ -1,4 +1,4 @@
-"""LIC: may it be used, and whom to thank?"""
+"""LIC rules: stated licence and attribution."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 
 NOT_SAID = frozenset({"", "unknown", "none", "noassertion", "other", "todo"})
-"""Words that stand where a licence should."""
+"""Placeholders in a licence field."""
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an asset without a licence."""
+    """Report an asset without a licence."""
     licence = (measured.asset.license or "").strip()
     if licence.lower() in NOT_SAID:
         yield Complaint(f"no licence is stated{f' ({licence!r})' if licence else ''}: nobody may pass it on")
 
 
 def attribution_missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a licence that asks for attribution, where nobody is named."""
+    """Report a licence that requires attribution if no author is named."""
     licence = (measured.asset.license or "").strip()
     if licence.upper().startswith("CC-BY") and not (measured.asset.attribution or "").strip():
         yield Complaint(f"{licence} asks to name the author, and none is named")

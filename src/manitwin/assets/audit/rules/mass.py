@@ -1,4 +1,4 @@
-"""MAS: is the mass that of such a thing?"""
+"""MAS rules: plausibility of the mass for shape, material and category."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ LEAST_WALL_M = {
     "cardboard": 0.0003, "paper": 0.00005, "rubber": 0.0001, "foam": 0.001, "textile": 0.0002, "leather": 0.0005,
     "food skin": 0.001, "wax": 0.001, "stone": 0.003, "unknown": 0.00005,
 }  # fmt: skip
-"""The thinnest wall that household things of a material have: PET bottles 0.25 mm, drinks cans 0.1 mm, bone china 2 mm,
-light bulbs 0.7 mm, copy paper 0.1 mm and tissue half of that: round numbers of ours, on the thin side."""
+"""Thinnest walls of household objects by material, in round numbers of ours, on the thin side.
+
+PET bottles 0.25 mm, drinks cans 0.1 mm, bone china 2 mm, light bulbs 0.7 mm, copy paper 0.1 mm and tissue half of that.
+"""
 
 OTHER_WORDS = {
     "porcelain": "ceramic", "china": "ceramic", "stoneware": "ceramic", "earthenware": "ceramic", "metal": "unknown",
@@ -28,42 +30,42 @@ OTHER_WORDS = {
     "melamine": "plastic", "acrylic": "plastic", "cloth": "textile", "fabric": "textile", "cotton": "textile",
     "plush": "textile", "carton": "cardboard", "sponge": "foam",
 }  # fmt: skip
-"""What else the materials of the priors are called; metal may be any."""
+"""Other names of the materials in the priors; metal may be any of them."""
 
 HOLDS_NOTHING = frozenset({"foam", "textile", "wood", "wax", "food skin"})
-"""Materials that no package is made of: their own density is the most there is."""
+"""Materials of which no package is made, so that their own density is the upper bound."""
 
 SLACK = 1.25
-"""Of the bounds on both sides: densities and scans are not exact."""
+"""Tolerance of the bounds on both sides: densities and scans are not exact."""
 
 BEYOND_USUAL = 3.0
-"""How far beyond the interval of nearly all (19 of 20) such things a mass may be."""
+"""Factor by which a mass may be beyond the interval of nearly all (19 of 20) objects of the category."""
 
 SIZE_SLACK = 1.5
-"""A mass is held against its category only where the size is that of such a thing, to this factor."""
+"""A mass is compared with its category only if the size fits the category up to this factor."""
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an asset that may move and declares no mass."""
+    """Report a movable asset that declares no mass."""
     if measured.asset.inertial.mass_kg is None and not measured.asset.static:
         yield Complaint("no mass is declared: the simulator takes one of its own")
 
 
 def not_positive(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a mass that no body has."""
+    """Report a mass that is not a positive number."""
     mass = measured.asset.inertial.mass_kg
     if mass is not None and not (math.isfinite(mass) and mass > 0):
         yield Complaint(f"the mass is {mass:g} kg", values={"mass_kg": mass})
 
 
 def positive_mass_kg(measured: MeasuredAsset) -> float | None:
-    """Return the declared mass, None where there is none or it is no number above zero."""
+    """Return the declared mass, None if there is none or it is not positive."""
     mass = measured.asset.inertial.mass_kg
     return mass if mass is not None and math.isfinite(mass) and mass > 0 else None
 
 
 def named_materials(words: str) -> list[str]:
-    """Return the materials of the priors that a text names, each once."""
+    """Return the materials of the priors that a text names, without duplicates."""
     known = load_materials()
     found = re.findall(r"[a-z]+", words)
     names = [OTHER_WORDS.get(word, word) for word in found] + [" ".join(pair) for pair in pairwise(found)]
@@ -71,12 +73,12 @@ def named_materials(words: str) -> list[str]:
 
 
 def possible_mass_kg(measured: MeasuredAsset) -> tuple[float, float, str] | None:
-    """Return the least and the most that a thing of this shape and material weighs, and what it is made of.
+    """Return the least and largest possible mass of this shape and material, and the name of the material.
 
-    Hollow things decide the least: half of the surface (both sides of a wall) times the thinnest wall of that material, or
-    the volume where that is smaller. The most is the convex hull full of it; of things that all are denser than any package
-    (dumbbells) the hull at their highest density, as the declared material is but their coat. None without a shape that has
-    volume.
+    Hollow objects determine the least mass: half of the surface area (both sides of a wall) times the thinnest wall of the
+    material, or the enclosed volume if that is smaller. The largest mass is that of the filled convex hull; for categories that
+    are always denser than any package (dumbbells), that of the hull at their highest density, because the declared material is
+    only their coating. None without a shape that has volume.
     """
     surface = measured.surface
     if surface is None or not len(measured.hull):
@@ -101,7 +103,7 @@ def possible_mass_kg(measured: MeasuredAsset) -> tuple[float, float, str] | None
 
 
 def against_volume(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a mass that no amount of that matter in that shape has; silent where the size is wrong already."""
+    """Report a mass that is impossible for shape and material; silent if the size is wrong already."""
     mass = positive_mass_kg(measured)
     possible = None if mass is None or is_of_wrong_size(measured) else possible_mass_kg(measured)
     if mass is None or possible is None:
@@ -116,7 +118,7 @@ def against_volume(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def against_category(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a mass far from that of nearly all such things of that size; silent where the volume says so already."""
+    """Report a mass far from nearly all objects of the category and size; silent if the mass is impossible for the volume."""
     mass, prior = positive_mass_kg(measured), measured.prior
     if mass is None or prior is None or measured.complaints(against_volume):
         return
@@ -131,7 +133,7 @@ def against_category(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def weighed_twice(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a mass that the format's engine makes more of, as it weighs the same place twice."""
+    """Report a mass that the format's engine increases, because it counts overlapping shapes twice."""
     declared, engine = positive_mass_kg(measured), measured.asset.inertial.engine_kg
     if declared is not None and engine is not None:
         yield Complaint(

@@ -1,4 +1,4 @@
-"""RUN, of parts: do those that joints move start apart, and do they stay so?"""
+"""RUN rules on moving parts: overlaps at loading, and collisions over the joint range."""
 
 from __future__ import annotations
 
@@ -18,14 +18,17 @@ from manitwin.assets.audit.rules.joints import limits_in_degrees
 from manitwin.errors import AssetError
 
 DEEP_M, DEEP_SHARE = 0.003, 0.03
-"""Of the smaller part's longest side: soft contacts and skins lie less deep in each other."""
+"""Tolerated penetration in metres, and as share of the longest side of the smaller part, for soft contacts and skins."""
 STARTS_INSIDE, FREED = 0.25, 0.5
-"""Which share of a part lies inside what holds it, and down to which part of it some position frees it: a housing does not."""
+"""Least share of a part inside its parent that counts as overlap, and the fraction of it that may remain.
+
+Some joint position must free the part down to that fraction, which a housing does not.
+"""
 PASSES_THROUGH = 0.35
-"""Of a part's surface; folded limbs of robots touch each other with less."""
+"""Share of a part's surface that passes through its parent; folded robot limbs have less."""
 _MOST_NAMED = 3
 _SELF_COLLIDING = ("mujoco", "sapien")
-"""PyBullet lets the links of a URDF collide with each other only where it is asked to."""
+"""PyBullet lets links of a URDF collide with each other only on request."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +53,12 @@ def _all_swept(measured: MeasuredAsset) -> list[Swept]:
 
 
 def parts_not_held_against_each_other(measured: MeasuredAsset) -> str:
-    """Return why the parts of the asset were not looked at; empty where they were, or where there are none."""
+    """Return why the parts of the asset were not checked; empty if they were, or if there are none."""
     return measured.once(_linkage).why_not
 
 
 def starts_overlapping(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of parts that lie in each other or in the ground as the asset is loaded."""
+    """Report parts that overlap each other or the ground at loading."""
     linkage = measured.once(_linkage).linkage
     if linkage is None:
         return
@@ -83,7 +86,7 @@ def starts_overlapping(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def passes_through(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of joints that drive a part through what holds it."""
+    """Report joints that drive a part through its parent."""
     linkage = measured.once(_linkage).linkage
     in_degrees = {name for said in measured.complaints(limits_in_degrees) for name in (said.values or {})["joints"]}
     found = [

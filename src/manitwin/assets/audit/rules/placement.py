@@ -1,4 +1,4 @@
-"""PLC: does it rest where it is said to rest?"""
+"""PLC rules: consistency of declared resting poses with the geometry."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from manitwin.assets.audit.rules.frames import is_sound
 from manitwin.geometry.poses import transform_points
 
 SLACK_M, SLACK_SHARE = 0.002, 0.01
-"""How far the lowest point may be from the plane: the larger of so many metres and a share of the longest side."""
+"""Allowed distance of the lowest point from the plane: the larger of a length and a share of the longest side."""
 
 PATCH_M, PATCH_SHARE = 0.003, 0.02
-"""Points so near to the plane, by the larger of the two, carry the object: real surfaces and settled poses are not exact."""
+"""Points this close to the plane, by the larger value, support the object: real surfaces and settled poses are not exact."""
 
 TIPS_M = 0.003
-"""How far outside the bearing points the centre of mass may be."""
+"""How far the centre of mass may be outside the support region."""
 
 
 def rest_off_plane(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a declared rest whose lowest point is not on the plane."""
+    """Report a declared rest whose lowest point is not on the plane."""
     if measured.body is None:
         return
     off = {
@@ -39,7 +39,7 @@ def rest_off_plane(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def origin_not_at_bottom(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain where the format is placed by its origin, and that is not at the bottom."""
+    """Report an origin that is not at the bottom, for formats that place objects by their origin."""
     if measured.bounds is None or measured.asset.format not in ("twin", "robotwin", "manitwin100k"):
         return
     if abs(measured.lowest_m) > _slack(measured):
@@ -51,7 +51,7 @@ def origin_not_at_bottom(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def tips_over(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a declared rest in which the centre of mass is not above what bears."""
+    """Report a declared rest in which the centre of mass is not above the support region."""
     center = measured.asset.inertial.center_of_mass_m
     if center is None or not np.isfinite(center).all() or measured.body is None:
         return
@@ -84,7 +84,7 @@ def _slack(measured: MeasuredAsset) -> float:
 
 
 def _outside_polygon(point: np.ndarray, polygon: np.ndarray) -> float:
-    """Return how far a point ``(2,)`` is outside the convex hull of points ``(N, 2)``; to a line where they are on one."""
+    """Return the distance of a point ``(2,)`` outside the convex hull of points ``(N, 2)``, or to their segment if collinear."""
     try:
         equations = ConvexHull(polygon).equations
     except (QhullError, ValueError):

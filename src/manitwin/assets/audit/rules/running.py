@@ -1,4 +1,4 @@
-"""RUN: what only running shows, in the engines of ``--engines``."""
+"""RUN rules: defects that only simulation shows, in the engines of ``--engines``."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from manitwin.assets.audit.rules.collision import filled_opening, has_convex_pie
 from manitwin.assets.audit.rules.parts import parts_not_held_against_each_other
 
 SUNK_M, SUNK_SHARE = 0.003, 0.03
-"""Below the plane, or apart in height, and which share of the longest side: a soft contact gives way by less than this."""
+"""Tolerated depth below the plane or difference in height, in metres and as share of the longest side: exceeds soft contact."""
 
 TURNED_RAD = np.deg2rad(10.0)
-"""A body that rests on the same points in both runs is turned by less."""
+"""A body that rests on the same points in both runs rotates by less."""
 
 
 def not_run(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain that the asset could not be run."""
+    """Report that the asset could not be simulated."""
     if not measured.engines:
         return
     dropped = measured.once(drops)
@@ -36,14 +36,14 @@ def not_run(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def refused(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of engines that refuse the body, or whose simulation blows up."""
+    """Report engines that refuse the body, or whose simulation diverges."""
     for run in _dropped(measured).runs:
         if run.refused:
             yield Complaint(f"{run.engine} does not run it: {run.refused}", values=_values(run))
 
 
 def leaves_plane(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a body that ends under the plane, or in the air."""
+    """Report a body that ends below the plane, or in the air."""
     dropped = _dropped(measured)
     for run in _ended(dropped):
         lowest_m = dropped.lowest_m(run)
@@ -57,10 +57,10 @@ def leaves_plane(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def jitters(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a body that stays where it is and does not come to rest; one that rolls away is left alone."""
+    """Report a body that neither moves away nor comes to rest; one that rolls away is ignored."""
     dropped = _dropped(measured)
     if measured.complaints(leaves_plane):
-        return  # one cause, one finding
+        return  # one finding for one cause
     for run in _ended(dropped):
         assert run.end is not None and dropped.start is not None
         moved_m = float(np.linalg.norm((run.end - dropped.start)[:2, 3]))
@@ -73,7 +73,7 @@ def jitters(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def depends_on_step(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a body that comes to rest in another way at half the step."""
+    """Report a body that comes to rest differently at half the time step."""
     dropped = _dropped(measured)
     if measured.complaints(leaves_plane):
         return
@@ -83,10 +83,10 @@ def depends_on_step(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def engines_disagree(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a body that comes to rest in another way in another engine."""
+    """Report a body that comes to rest differently in another engine."""
     dropped = _dropped(measured)
     if measured.complaints(leaves_plane) or measured.complaints(depends_on_step):
-        return  # one cause, one finding
+        return  # one finding for one cause
     pairs = combinations(_one_each(dropped), 2)
     found = (_differ(measured, dropped, one, other, f"in {other.engine} and in {one.engine}") for one, other in pairs)
     yield from islice(chain.from_iterable(found), 1)
@@ -96,7 +96,7 @@ def _differ(measured: MeasuredAsset, dropped: Drops, one: Run, other: Run, where
     if not (one.at_rest and other.at_rest):
         return
     assert one.end is not None and other.end is not None
-    up = [run.end[2, :3] for run in (one, other) if run.end is not None]  # the plane's normal, in the asset's axes
+    up = [run.end[2, :3] for run in (one, other) if run.end is not None]  # the plane's normal in the asset's axes
     tilt_rad = float(np.arccos(np.clip(up[0] @ up[1], -1, 1)))
     apart_m = abs(dropped.height_m(one) - dropped.height_m(other))
     if tilt_rad > TURNED_RAD or apart_m > _slack_m(measured):
@@ -108,7 +108,7 @@ def _differ(measured: MeasuredAsset, dropped: Drops, one: Run, other: Run, where
 
 
 def tips(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Note a body that tips over in every engine, put down as it stands in its file."""
+    """Note a body that tips over in every engine when put down in the pose of its file."""
     dropped = _dropped(measured)
     ended = _ended(dropped)
     if not ended or dropped.start is None or measured.complaints(leaves_plane):
@@ -124,10 +124,10 @@ def tips(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def opening_closed(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an opening that is seen, and that a ball does not get into or does not stay in."""
+    """Report a visible opening that a ball does not enter, or in which it does not stay."""
     asset = measured.asset
     if not measured.engines or asset.static or asset.partial or measured.complaints(filled_opening):
-        return  # one cause, one finding
+        return  # one finding for one cause
     if not has_convex_pieces(measured):
         return
     found = measured.once(balls)
@@ -141,7 +141,7 @@ def opening_closed(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def joints_do_not_hold(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a twin that, put down in MuJoCo with its joints free, leaves the plane or ends beyond a joint's limit."""
+    """Report a twin that, with free joints in MuJoCo, leaves the plane or ends beyond a joint limit."""
     record = measured.record
     if "mujoco" not in measured.engines or record is None or not record.joints or not record.placements:
         return
@@ -169,7 +169,7 @@ def _ended(dropped: Drops) -> list[Run]:
 
 
 def _one_each(dropped: Drops) -> list[Run]:
-    """Return the run of each engine at its usual step."""
+    """Return the run of each engine at its usual time step."""
     return list({run.engine: run for run in reversed(_ended(dropped))}.values())[::-1]
 
 

@@ -1,4 +1,4 @@
-"""SCL: metres, and the right way up?"""
+"""SCL rules: unit and up axis."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.models.annotators.prior_records import Interval
 
 SMALLEST_M, LARGEST_M = 0.001, 2.0
-"""Longest sides that nothing else has to speak for: from the smallest parts that robots place to what an arm reaches across."""
+"""Longest sides accepted without further evidence: from the smallest parts that robots place to the reach of an arm."""
 
 AIR_KG_M3 = 1.2
-"""At 20 degrees Celsius and sea level: a thing whose convex hull is lighter than so much air has another size, or mass."""
+"""At 20 degrees Celsius and sea level: an object lighter than the air in its convex hull has a wrong size or mass."""
 
 LARGEST_UNWEIGHED_M = 10.0
-"""Of what declares no mass: furniture, robots and vehicles are shorter; a thing of 10 cm in centimetres is as long."""
+"""Size limit without a declared mass: furniture, robots and vehicles are smaller; 10 cm read as metres are 10 m."""
 
 BEYOND_USUAL = 4.0
-"""How far beyond the interval of nearly all such things a longest side may be: toys and samples are smaller."""
+"""Factor by which the longest side may be beyond the usual interval of the category: toys and samples are smaller."""
 
 MIX_UPS = {1000.0: "millimetres taken for metres", 100.0: "centimetres taken for metres",
            10.0: "centimetres taken for decimetres", 25.4: "inches taken for millimetres",
            1 / 1000: "metres taken for millimetres", 1 / 100: "metres taken for centimetres",
            1 / 10: "decimetres taken for centimetres", 1 / 25.4: "millimetres taken for inches"}  # fmt: skip
-"""By how much too large, and what happened."""
+"""Factors of excess size, and the unit mix-up that explains them."""
 
 FLOOR_SHARE, CENTER_SHARE = 0.01, 0.02
-"""Of the longest side: how exactly an object stands on the plane through the origin, and above it."""
+"""Shares of the longest side: tolerances for standing on the plane through the origin, and for being centred above it."""
 
 
 def outside_hand_size(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of objects that are dust, or of a size that their own mass speaks against."""
+    """Report objects of extreme size, or of a size that contradicts their own mass."""
     longest = measured.longest_m
     if measured.asset.static or measured.bounds is None or SMALLEST_M <= longest <= LARGEST_M:
         return
-    if longest > LARGEST_M and measured.asset.inertial.mass_kg == 0:  # MAS002 says so; Bullet lets it stand fast
+    if longest > LARGEST_M and measured.asset.inertial.mass_kg == 0:  # reported by MAS002; Bullet treats it as static
         return
     mass, hull_m3 = measured.asset.inertial.mass_kg, float(measured.hull.volumes_m3.sum())
     if len(measured.shapes):  # walls of a room enclose air
@@ -52,7 +52,7 @@ def outside_hand_size(measured: MeasuredAsset) -> Iterator[Complaint]:
         elif longest <= LARGEST_UNWEIGHED_M:
             return
     usual = Interval(low=0.02, typical=0.15, high=0.5) if measured.prior is None else measured.prior.longest_axis_m
-    if measured.prior is not None and LARGEST_M < longest <= usual.high:  # a quilt on a bed has air below it
+    if measured.prior is not None and LARGEST_M < longest <= usual.high:  # a quilt on a bed encloses air
         return
     yield Complaint(
         f"the longest side is {_length(longest)}{because}{_mix_up(longest, usual)}", values={"longest_m": longest}
@@ -60,7 +60,7 @@ def outside_hand_size(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def against_category(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a size that no such thing has; silent where the size is absurd for anything."""
+    """Report a size that is implausible for the category; silent if the size is out of range for any object."""
     if measured.prior is None or measured.bounds is None or measured.complaints(outside_hand_size):
         return
     usual, longest = measured.prior.longest_axis_m, measured.longest_m
@@ -73,7 +73,7 @@ def against_category(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def is_of_wrong_size(measured: MeasuredAsset) -> bool:
-    """Tell whether the size is wrong, so that what else is measured by it says nothing new."""
+    """Return whether the size is wrong, so that findings that depend on it would be redundant."""
     return bool(measured.complaints(outside_hand_size) or measured.complaints(against_category))
 
 
@@ -90,7 +90,7 @@ def _length(metres: float) -> str:
 
 
 def up_axis(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an object that stands on the origin's plane, or opens, along another axis than its format's up."""
+    """Report an object that stands on the origin's plane, or opens, along another axis than the format's up axis."""
     if measured.bounds is None or measured.asset.static:  # a cupboard opens to its front
         return
     declared = measured.asset.up
@@ -107,7 +107,7 @@ def up_axis(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def _stands(bounds: np.ndarray, up: np.ndarray) -> bool:
-    """Tell whether a box stands on the plane through the origin, with the origin under its middle."""
+    """Return whether a box stands on the plane through the origin, with the origin below its centre."""
     sides = np.ptp(bounds, axis=0)
     longest = float(sides.max())
     along = int(np.abs(up).argmax())
@@ -119,7 +119,7 @@ def _stands(bounds: np.ndarray, up: np.ndarray) -> bool:
 
 
 def unit_not_declared(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a format with a default unit that is not the metre, where the file declares none."""
+    """Report a missing unit for formats whose default unit is not the metre."""
     if measured.asset.unit_m is None and measured.asset.format in ("usd", "manitwin100k"):
         yield Complaint("the file declares no unit: USD's default is the centimetre, other tools take metres")
 

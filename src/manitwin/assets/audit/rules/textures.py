@@ -1,4 +1,4 @@
-"""TEX: textures that load everywhere."""
+"""TEX rules: texture sizes that load everywhere."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MAPS = (
 
 
 def texture_sizes(asset: Asset) -> list[tuple[int, int]]:
-    """Return the width and height of every texture of the visual parts, each image once."""
+    """Return width and height of every texture image of the visual parts, without duplicates."""
     images: dict[int, tuple[int, int]] = {}
     for part in asset.visual:
         material = getattr(part.visual, "material", None)
@@ -35,7 +35,7 @@ def texture_sizes(asset: Asset) -> list[tuple[int, int]]:
 
 
 def too_large(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of textures that a simulator scales down or refuses."""
+    """Report textures that simulators scale down or refuse."""
     large = sorted({size for size in texture_sizes(measured.asset) if max(size) > LARGEST_PIXELS}, reverse=True)
     if large:
         sizes = ", ".join(f"{width} x {height}" for width, height in large[:4])
@@ -45,7 +45,7 @@ def too_large(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def not_power_of_two(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of textures whose sides are no powers of two."""
+    """Report textures whose sides are not powers of two."""
     odd = sorted({size for size in texture_sizes(measured.asset) if any(side & (side - 1) for side in size)})
     if odd:
         sizes = ", ".join(f"{width} x {height}" for width, height in odd[:4])

@@ -1,4 +1,4 @@
-"""TWN: does a twin's record say what its files hold?"""
+"""TWN rules: consistency of a twin's record with its files."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import NO_PART
 
 CANDIDATE_M, CANDIDATE_SHARE = 0.005, 0.03
-"""How far a candidate may be from the visual surface: it was sampled on the repaired solid, which repair may move."""
+"""Largest distance of a candidate point from the visual surface: it was sampled on the repaired solid, which may deviate."""
 
 SIDE_M, SIDE_SHARE = 0.001, 0.01
-"""How far a side in the record may be from the mesh's, and which share of the longest."""
+"""Allowed difference of a side in the record from the mesh, in metres and as share of the longest side."""
 
 LINK_MASS_SHARE = 1e-3
-"""Of the mass: the links' may differ by rounding."""
+"""Relative difference between the sum of the link masses and the twin's mass that rounding explains."""
 
 
 def candidates_off_surface(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of candidate points that do not lie on the surface."""
+    """Report candidate points off the surface."""
     if measured.record is None or measured.record.points is None or not len(measured.samples):
         return
     points = np.array(measured.record.points.candidates.positions_m, float).reshape(-1, 3)
@@ -44,7 +44,7 @@ def candidates_off_surface(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def extents_differ(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a record whose size is not that of the mesh."""
+    """Report a record whose extents differ from the mesh."""
     if measured.record is None or measured.record.physical is None or measured.bounds is None:
         return
     said, real = np.array(measured.record.physical.extents_m), np.ptp(measured.bounds, axis=0)
@@ -58,7 +58,7 @@ def extents_differ(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def face_parts_differ(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of parts whose faces are not those of the visual mesh, or are not as many as the record says."""
+    """Report part labels that do not match the faces of the visual mesh, or the face counts of the record."""
     if measured.record is None or not measured.record.parts:
         return
     path = measured.asset.path
@@ -77,7 +77,7 @@ def face_parts_differ(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def links_differ(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of links that do not weigh together what the twin does, or are of other faces and hulls than it has."""
+    """Report links whose total mass, faces or hulls differ from those of the twin."""
     record = measured.record
     if record is None or not record.links or record.physical is None:
         return
@@ -109,7 +109,7 @@ def links_differ(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def frames_off_feature(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of functional frames that do not lie at the feature that they are said to be of."""
+    """Report functional frames that are away from their feature."""
     if measured.record is None or measured.record.points is None or not len(measured.samples):
         return
     limit = max(ON_FEATURE_M, measured.spacing_m)
@@ -134,7 +134,7 @@ def frames_off_feature(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def frame_kinds(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of frames of a kind that the label of their point cannot mean."""
+    """Report frames of a kind that does not fit the label of their point."""
     if measured.record is None or measured.record.points is None:
         return
     odd = [
