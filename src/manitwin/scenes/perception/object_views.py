@@ -1,4 +1,4 @@
-"""What one picture shows of one object, from rays that are cast at it alone: how much of it, where, and which of its parts."""
+"""Visibility of one object in a picture, by ray casts at that object alone: its share, its boxes and its parts."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import NO_PART, Part
 
 NEAR_M = 0.01
-"""The near plane of the cameras: nothing nearer is drawn."""
+"""The near plane of the cameras: nothing nearer is rendered."""
 
 Box = tuple[int, int, int, int]
-"""Pixels ``x, y, width, height``; x and y may lie outside of the picture."""
+"""A box ``x, y, width, height`` in pixels; x and y may lie outside the picture."""
 
 
 @dataclass(frozen=True)
 class SeenShape:
-    """A twin as pictures see it: rays at its visual surface, its vertices ``(V, 3)`` and the part ``(F,)`` of each face.
+    """A twin's visual surface: a ray caster, its vertices ``(V, 3)`` and the part ``(F,)`` of each face.
 
-    Object frame, metres. ``face_parts`` are indices into ``parts``, 255 (``NO_PART``) for none.
+    In the object frame, in metres. ``face_parts`` are indices into ``parts``; 255 (``NO_PART``) for none.
     """
 
     caster: RayCaster
@@ -44,10 +44,10 @@ class SeenShape:
 
 @dataclass(frozen=True)
 class ObjectView:
-    """An object in one picture, in pixels.
+    """The visibility of an object in one picture, in pixels.
 
-    ``amodal_px`` is its whole silhouette, as if it stood alone and the picture went on beyond its frame, up to its own size on
-    each side; of it ``amodal_in_frame_px`` are in the frame and ``visible_px`` are seen. Boxes are None where nothing is.
+    ``amodal_px`` counts its whole silhouette, without other objects and beyond the frame, up to one picture size on each side.
+    ``amodal_in_frame_px`` of these lie in the frame, and ``visible_px`` are visible. Boxes are None if empty.
     """
 
     visible_px: int
@@ -58,16 +58,16 @@ class ObjectView:
 
     @property
     def visible_share(self) -> float:
-        """The visible share of the silhouette: BOP's ``visib_fract``."""
+        """The visible share of the silhouette: ``visib_fract`` of BOP."""
         return self.visible_px / self.amodal_px if self.amodal_px else 0.0
 
     @property
     def cut_by_frame(self) -> bool:
-        """Whether the picture's frame cuts it."""
+        """Whether the frame of the picture cuts the silhouette."""
         return self.amodal_in_frame_px < self.amodal_px
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON values, with the visible share and whether the frame cuts it."""
+        """Return the view as JSON values, with the visible share and whether the frame cuts the silhouette."""
         return {
             "visible_px": self.visible_px,
             "amodal_px": self.amodal_px,
@@ -81,9 +81,9 @@ class ObjectView:
 
 @dataclass(frozen=True)
 class Silhouette:
-    """The silhouette of an object alone: ``amodal (H, W) bool`` in the frame, the face ``(H, W)`` at each pixel (-1: none).
+    """The silhouette of an object alone: ``amodal (H, W) bool`` in the frame, the face ``(H, W)`` at each pixel, -1 for none.
 
-    ``amodal_px`` and ``box`` are those of the whole silhouette, also beyond the frame.
+    ``amodal_px`` and ``box`` describe the whole silhouette, including what lies beyond the frame.
     """
 
     amodal: np.ndarray
@@ -93,7 +93,7 @@ class Silhouette:
 
 
 def silhouette_of(shape: SeenShape, object_to_world: np.ndarray, camera: Camera) -> Silhouette:
-    """Cast rays through the centres of all pixels that an object alone may cover (``camera_to_object`` is in the world)."""
+    """Cast rays through all pixels that an object alone may cover; ``camera.camera_to_object`` is the pose in the world."""
     width, height = camera.width_px, camera.height_px
     left, top, right, bottom = _covered(shape, object_to_world, camera)
     columns, rows = np.meshgrid(np.arange(left, right) + 0.5, np.arange(top, bottom) + 0.5)
@@ -124,9 +124,9 @@ def silhouette_of(shape: SeenShape, object_to_world: np.ndarray, camera: Camera)
 
 
 def view_of(silhouette: Silhouette, visible: np.ndarray) -> ObjectView:
-    """Return what a picture shows of an object: its ``silhouette``, and where it is seen, ``visible (H, W) bool``.
+    """Return the view of an object from its ``silhouette`` and its visible pixels, ``visible (H, W) bool``.
 
-    Visible pixels count as silhouette too: at a rim the rays of one and the rasterizer of the other may differ by a pixel.
+    Visible pixels count as silhouette too: at an edge, the ray casts and the rasterizer may differ by a pixel.
     """
     beyond = int((visible & ~silhouette.amodal).sum())
     return ObjectView(
@@ -139,7 +139,7 @@ def view_of(silhouette: Silhouette, visible: np.ndarray) -> ObjectView:
 
 
 def parts_seen(shape: SeenShape, silhouette: Silhouette, visible: np.ndarray) -> np.ndarray:
-    """Return the part ``(H, W) int`` at each visible pixel, as its index in ``shape.parts``; -1 where none is."""
+    """Return the part ``(H, W) int`` at each visible pixel, as an index into ``shape.parts``; -1 for none."""
     parts = np.full(visible.shape, -1, np.int64)
     at = visible & silhouette.amodal
     found = shape.face_parts[silhouette.face[at]].astype(np.int64)
@@ -148,7 +148,7 @@ def parts_seen(shape: SeenShape, silhouette: Silhouette, visible: np.ndarray) ->
 
 
 def box_of(mask: np.ndarray) -> Box | None:
-    """Return the box of the pixels that are set in ``(H, W) bool``; None where none is."""
+    """Return the bounding box of the set pixels of ``(H, W) bool``; None if there are none."""
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     if not len(rows):
         return None
@@ -158,12 +158,12 @@ def box_of(mask: np.ndarray) -> Box | None:
 
 
 def _covered(shape: SeenShape, object_to_world: np.ndarray, camera: Camera) -> tuple[int, int, int, int]:
-    """Return the pixels ``left, top, right, bottom`` that may show an object: its box, one picture beyond the frame at most."""
+    """Return the pixel range ``left, top, right, bottom`` that an object may cover, up to one picture size beyond the frame."""
     width, height = camera.width_px, camera.height_px
     pixels, depth_m = project(transform_points(object_to_world, shape.vertices_m), camera)
     if not (depth_m > NEAR_M).any():
         return 0, 0, 0, 0
-    if not (depth_m > NEAR_M).all():  # some of it is behind the camera: anywhere
+    if not (depth_m > NEAR_M).all():  # partly behind the camera, so it may project anywhere
         return -width, -height, 2 * width, 2 * height
     low, high = np.floor(pixels.min(0)).astype(int), np.ceil(pixels.max(0)).astype(int)
     left, top = np.clip(low, [-width, -height], [2 * width, 2 * height])

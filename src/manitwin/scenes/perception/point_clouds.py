@@ -1,4 +1,4 @@
-"""Point clouds of scenes: what all cameras see, in one cloud, with the truth of each point."""
+"""Point clouds of scenes: the pixels of all cameras in one cloud, with the ground truth of each point."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ POINTS = 100_000
 def write_point_clouds(
     scenes: Iterable[SceneTruth], classes: Classes, out: Output, *, validation_share: float, points: int = POINTS
 ) -> None:
-    """Write ``<split>/<scene>.npz`` of at most ``points`` pixels a scene, drawn evenly from all cameras, and ``classes.json``.
+    """Write ``<split>/<scene>.npz`` with at most ``points`` random pixels for each scene, and ``classes.json``.
 
-    ``xyz_m (N, 3) f32`` and ``normal (N, 3) f32`` in the world frame, ``rgb (N, 3) u8``, ``instance`` (the ids of
-    ``pictures.json``; 0: floor), ``semantic`` and ``part`` (0: none) ``(N,) i32``; ``camera (N,) u8`` in the order of
-    ``cameras`` and ``pixel (N, 2) u16`` (column, row) say where each comes from.
+    Pixels are drawn uniformly from all cameras. ``xyz_m (N, 3) f32`` and ``normal (N, 3) f32`` are in the world frame;
+    ``rgb (N, 3) u8``; ``instance`` (the ids of ``pictures.json``; 0 for the floor), ``semantic`` and ``part`` (0 for none) are
+    ``(N,) i32``. ``camera (N,) u8``, an index into ``cameras``, and ``pixel (N, 2) u16`` (column, row) give the source of each
+    point.
     """
     for scene in scenes:
         clouds = [_cloud(number, scene, picture, classes) for number, picture in enumerate(scene.pictures)]
@@ -39,9 +40,9 @@ def write_point_clouds(
 
 
 def back_projected(depth_m: np.ndarray, intrinsics: np.ndarray, camera_to_world: np.ndarray) -> np.ndarray:
-    """Return the world points ``(H, W, 3)`` of a picture of depths ``(H, W)``; those of depth 0 are the camera's own place.
+    """Return the world points ``(H, W, 3)`` of a depth picture ``(H, W)``; pixels of depth 0 give the camera position.
 
-    ``intrinsics (3, 3)`` has the upper left pixel's centre at (0.5, 0.5); ``camera_to_world (4, 4)`` has OpenGL's axes.
+    In ``intrinsics (3, 3)`` the centre of the upper left pixel is (0.5, 0.5); ``camera_to_world (4, 4)`` uses OpenGL axes.
     """
     rows, columns = np.indices(depth_m.shape) + 0.5
     right = (columns - intrinsics[0, 2]) / intrinsics[0, 0]

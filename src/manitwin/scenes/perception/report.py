@@ -1,4 +1,4 @@
-"""The page of segmentation: samples with their labels drawn over them, counts of classes, and how much of things is seen."""
+"""Report page of segmentation: samples with their labels drawn over them, class counts, and visible shares."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from manitwin.scenes.perception.splits import split_of
 
 SAMPLE_PX, MOST_SAMPLES = 256, 12
 LABEL_SHARE = 0.5
-"""The share of the label's colour in a sample's pixel; the rest is the picture's."""
+"""The weight of the label's colour in a sample's pixel; the rest is the picture's colour."""
 BINS, BAR = 10, 40
-"""Bins of the histogram of visible shares, and the characters of its longest bar."""
+"""Number of bins of the histogram of visible shares, and characters of its longest bar."""
 
 
 @dataclass
 class _Counts:
-    """What is counted while the scenes are gone through; an instance is an object in one picture that shows some of it."""
+    """Counts accumulated over the scenes; an instance is an object in one picture that shows some of it."""
 
     scenes: Counter[str] = field(default_factory=Counter)
     pictures: int = 0
@@ -37,7 +37,7 @@ class _Counts:
 
 
 def segmentation_page(scenes: Iterable[SceneTruth], classes: Classes, form: str, validation_share: float) -> bytes:
-    """Return the page of all scenes; the samples are the cameras of the scenes by turns. Raises UsageError."""
+    """Return the page of all scenes; samples take the cameras of the scenes in turn. Raises UsageError."""
     counts, samples = _Counts(), list[Picture]()
     for number, scene in enumerate(scenes):
         counts.scenes[split_of(scene.record.scene_id, validation_share)] += 1
@@ -74,7 +74,7 @@ def _count(counts: _Counts, scene: SceneTruth, picture: PictureTruth) -> None:
 
 
 def _sample(scene: SceneTruth, picture: PictureTruth) -> Picture:
-    """Draw the instances' colours over a picture, with a white line around each."""
+    """Blend the colours of the instances into a picture, with a white outline around each."""
     numbers = [scene.ids[thing.name] for thing in scene.record.objects]
     drawn = picture.rgb.copy()
     on_object = np.isin(picture.ids, numbers)

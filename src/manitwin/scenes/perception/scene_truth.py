@@ -1,4 +1,4 @@
-"""The truth of a scene's pictures as ``manitwin layout --pictures`` leaves it, read without trust; every format is made of it."""
+"""Ground truth of a scene's pictures as ``manitwin layout --pictures`` writes it, read as untrusted; all formats use it."""
 
 from __future__ import annotations
 
@@ -65,10 +65,10 @@ class _Pictures(_Facts):
 
 @dataclass(frozen=True)
 class PictureTruth:
-    """One picture of a scene: its camera (``camera_to_object`` is the pose in the world), and what it shows of each object.
+    """One picture of a scene: its camera (``camera_to_object`` is the pose in the world) and its view of each object.
 
-    Arrays are read when asked for: ``rgb (H, W, 3) uint8``; ``ids (H, W)``, 0 floor and backdrop; ``parts (H, W)``, 0 none;
-    ``depth_m (H, W)`` along the viewing axis, 0 nothing; ``normals (H, W, 3)`` in the world frame. Raise UsageError.
+    Arrays are read on access: ``rgb (H, W, 3) uint8``; ``ids (H, W)``, 0 for floor and backdrop; ``parts (H, W)``, 0 for none;
+    ``depth_m (H, W)`` along the viewing axis, 0 for none; ``normals (H, W, 3)`` in the world frame. Each raises UsageError.
     """
 
     name: str
@@ -80,7 +80,7 @@ class PictureTruth:
 
     @cached_property
     def rgb(self) -> np.ndarray:
-        """The colours ``(H, W, 3) uint8`` sRGB; raises UsageError where they cannot be read."""
+        """The sRGB colours ``(H, W, 3) uint8``; raises UsageError if unreadable."""
         path = self.folder / f"{self.name}_rgb.webp"
         try:
             pixels = read_image(path).pixels[..., :3]
@@ -90,22 +90,22 @@ class PictureTruth:
 
     @cached_property
     def ids(self) -> np.ndarray:
-        """The thing at each pixel's centre."""
+        """The id at each pixel's centre."""
         return self._numbers("ids")
 
     @cached_property
     def parts(self) -> np.ndarray:
-        """The part at each pixel's centre."""
+        """The part number at each pixel's centre."""
         return self._numbers("parts")
 
     @cached_property
     def depth_m(self) -> np.ndarray:
-        """The depth at each pixel's centre."""
+        """The depth (m) at each pixel's centre."""
         return self._numbers("depth") * self.depth_unit_m
 
     @cached_property
     def normals(self) -> np.ndarray:
-        """The normal at each pixel's centre, 0 where nothing is."""
+        """The unit normal at each pixel's centre; 0 for none."""
         path = self.folder / f"{self.name}_normals.png"
         try:
             pixels = self._of_size(read_image(path).pixels[..., :3], path)
@@ -141,7 +141,7 @@ class SceneTruth:
 
 
 def read_scene_truth(scene_file: Path) -> SceneTruth:
-    """Read a scene file and what lies in the folder of its pictures; raises UsageError naming file, cause and remedy."""
+    """Read a scene file and the files of its pictures; raises UsageError naming the file, the cause and the remedy."""
     folder = scene_file.parent
     content = read_bytes(scene_file, MAX_JSON_BYTES, UsageError, inside=folder, name=str(scene_file))
     record = parse_scene(content, scene_file)

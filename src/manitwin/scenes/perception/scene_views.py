@@ -1,4 +1,4 @@
-"""What each camera of a scene shows of its objects and their parts."""
+"""Views of a scene's objects and their parts from each camera."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from manitwin.scenes.scene import SceneCamera, SceneRecord
 
 @dataclass(frozen=True)
 class ScenePart:
-    """A part of an object in a scene: the object's name, its category, the part's id in the twin, and the part's name."""
+    """A part of an object in a scene: the object's name and category, the part's id in the twin, and the part's name."""
 
     object: str
     category: str
@@ -24,24 +24,24 @@ class ScenePart:
     name: str
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON values."""
+        """Return the part as JSON values."""
         return asdict(self)
 
 
 def scene_camera(camera: SceneCamera, width_px: int, height_px: int) -> Camera:
-    """Return a camera of a scene, its ``camera_to_object`` being its pose in the world."""
+    """Return a camera of a scene; its ``camera_to_object`` is its pose in the world."""
     pose = look_at(np.array(camera.position_m), np.array(camera.target_m))
     return Camera(pose, camera.fov_y_rad, width_px, height_px)
 
 
 def intrinsics(camera: Camera) -> list[list[float]]:
-    """Return ``K (3, 3)`` of the axes x right, y down, z ahead; the upper left pixel's centre is (0.5, 0.5)."""
+    """Return ``K (3, 3)`` with axes x right, y down, z forward; the centre of the upper left pixel is (0.5, 0.5)."""
     focal_px = camera.focal_px
     return [[focal_px, 0.0, camera.width_px / 2], [0.0, focal_px, camera.height_px / 2], [0.0, 0.0, 1.0]]
 
 
 def scene_parts(record: SceneRecord, shapes: Mapping[str, SeenShape]) -> list[ScenePart]:
-    """Return the parts of all objects of a scene, in the record's order; ``shapes`` are by twin."""
+    """Return the parts of all objects of a scene, in the record's order; ``shapes`` are by twin id."""
     return [
         ScenePart(thing.name, thing.category, part.id, part.name)
         for thing in record.objects
@@ -57,7 +57,7 @@ def views_and_parts(
     ids: np.ndarray | None,
     id_of: Mapping[str, int],
 ) -> tuple[dict[str, ObjectView], np.ndarray]:
-    """Return what a picture shows of each object by name, and the part at each pixel, ``(H, W)``, counted from 1; 0: none.
+    """Return the view of each object by name, and the part number at each pixel, ``(H, W)``, from 1; 0 for none.
 
     ``ids (H, W)`` is the picture of ids.
     """

@@ -1,4 +1,4 @@
-"""Segmentation data sets of a run's scenes, in the formats that training codes read."""
+"""Segmentation data sets of a run's scenes, in common training formats."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Segmented:
 
 @dataclass(frozen=True)
 class _Asked:
-    """What an export is asked for."""
+    """The options of an export."""
 
     validation_share: float
     points: int
@@ -62,7 +62,7 @@ FORMATS: Mapping[str, _Write] = {
         scenes, classes, out, validation_share=asked.validation_share, points=asked.points
     ),
 }
-"""The formats by name."""
+"""The writers by the name of their format."""
 
 
 def write_segmentation(
@@ -74,11 +74,12 @@ def write_segmentation(
     validation_share: float = VALIDATION_SHARE,
     points: int = POINTS,
 ) -> Segmented:
-    """Write the segmentation data set of drawn scenes in one format, whole or not at all.
+    """Write the segmentation data set of rendered scenes in one format, atomically.
 
-    ``scenes`` is what ``manitwin layout --pictures`` wrote, or one scene of it; ``dataset`` is where its twins are, by default
-    where it says. ``validation_share`` of the scenes, chosen by their ids, go into the split ``val``. ``points`` are those of
-    a scene's cloud. Raises UsageError for an unknown format, scenes that were not drawn, or an ``out`` that is not empty.
+    ``scenes`` is the output of ``manitwin layout --pictures``, or one scene of it. ``dataset`` is the folder of its twins, by
+    default the one that the run names. ``validation_share`` of the scenes, selected by their ids, form the split ``val``.
+    ``points`` limits the size of a scene's point cloud. Raises UsageError for an unknown format, scenes without pictures, or an
+    ``out`` that is not empty.
     """
     if form not in FORMATS:
         raise UsageError(choose_from("format", form, FORMATS))
@@ -101,7 +102,7 @@ def write_segmentation(
 
 @dataclass(frozen=True)
 class _Scenes:
-    """The truth of scenes, read anew each time that they are gone through: the pictures of one at a time are in memory."""
+    """The ground truth of scenes, read again in each iteration: the pictures of only one scene are in memory at a time."""
 
     files: Sequence[Path]
 

@@ -1,1 +1,1 @@
-"""Questions about drawn scenes with computed answers, for training and judging vision-language models."""
+"""Questions about rendered scenes with computed answers, for training and evaluating vision-language models."""

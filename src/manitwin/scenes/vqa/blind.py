@@ -1,4 +1,4 @@
-"""What a reader of the words alone gets right: a measure of what questions give away without their pictures."""
+"""Text-only baseline: the accuracy of a classifier that reads questions without their pictures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PICTURE_PX = 1000
 
 @dataclass(frozen=True)
 class BlindScore:
-    """Of so many closed questions: the share right by ``chance``, and by words alone (``blind``)."""
+    """The accuracy on a number of closed questions, by ``chance`` and by a text-only classifier (``blind``)."""
 
     questions: int
     chance: float
@@ -26,11 +26,11 @@ class BlindScore:
 
 
 def blind_scores(training: Sequence[Question], asked: Sequence[Question]) -> dict[str, BlindScore]:
-    """Train a reader of words on some closed questions and score it on others, by family and over all (``all``).
+    """Train a text-only classifier on closed questions and score it on others, by family and overall (``all``).
 
-    The reader is a logistic regression over words, pairs of neighbouring words, each option's words and place, and each word with
-    each option; it answers with the likeliest option. Source of the method: bag of n-grams as in VQA's question-only baselines
-    (Goyal et al. 2017, "Making the V in VQA matter").
+    The classifier is a logistic regression over words, word bigrams, the words and the position of each option, and each word
+    with each option; it answers with the likeliest option. Source of the method: bag of n-grams as in the question-only
+    baselines of VQA (Goyal et al. 2017, "Making the V in VQA matter").
     """
     by_family: dict[str, list[Question]] = defaultdict(list)
     for question in training:

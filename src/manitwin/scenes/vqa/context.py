@@ -1,4 +1,4 @@
-"""What the families of questions are given of one picture."""
+"""Input of the question families: one picture with its objects, directions, gaps and slides."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from manitwin.scenes.vqa.sweeps import Slide, Way, can_be_slid, sweep
 from manitwin.scenes.vqa.things import Seen, Thing, View
 
 LEAST_INNER_PX = 3.0
-"""A point that is asked for or about lies so deep inside of what it is on (px of a picture of 512 x 512)."""
+"""Least distance of a point in question from the border of its mask (px of a picture 512 wide)."""
 
 
 SlideKey = tuple[str, float, float, float, float]
-"""An object's name, where it starts, and its direction."""
+"""An object's name, the start of its slide, and its direction."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What was measured in a scene for one of its pictures and holds for all: gaps (m) of two objects, and ways."""
+    """Measurements of a scene, shared by its pictures: gaps (m) between pairs of objects, and swept ways."""
 
     gaps_m: dict[tuple[str, str], float] = field(default_factory=dict)
     ways: dict[SlideKey, Way] = field(default_factory=dict)
@@ -35,7 +35,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Context:
-    """One picture of a scene; ``words`` are the references by object's name, ``categories`` those of all scenes."""
+    """One picture of a scene; ``words`` are references by object name, ``categories`` are those of all scenes."""
 
     scene: SceneTruth
     things: Sequence[Thing]
@@ -47,12 +47,12 @@ class Context:
 
     @cached_property
     def named(self) -> list[Seen]:
-        """The clear objects that have words of their own."""
+        """The clear objects that have a reference."""
         return [each for each in self.view.clear if each.thing.name in self.words]
 
     @cached_property
     def pointed(self) -> list[tuple[Seen, Point]]:
-        """The clear objects that a point can mean, with it."""
+        """The clear objects that a point can identify, with that point."""
         found = []
         for each in self.view.clear:
             point, deep_px = each.inner
@@ -62,51 +62,52 @@ class Context:
 
     @cached_property
     def directions(self) -> list[Direction]:
-        """The picture's directions, and the robot's where the picture lets one know them."""
+        """The directions of the picture, and those of the robot if the picture determines them."""
         camera = self.view.camera
         return [*picture_directions(camera), *robot_directions(camera, self.things[0].center_m)]
 
     @property
     def looks_down_rad(self) -> float:
-        """The angle between the camera's viewing axis and the level."""
-        return float(np.arcsin(np.clip(self.view.camera.camera_to_object[2, 2], -1, 1)))  # its axis is -z (OpenGL)
+        """The angle between the camera's viewing axis and the horizontal plane, positive downward."""
+        # the viewing axis is -z (OpenGL)
+        return float(np.arcsin(np.clip(self.view.camera.camera_to_object[2, 2], -1, 1)))
 
     @property
     def surface(self) -> str:
-        """The words for what the objects stand on: its material as it is drawn, and ``surface``."""
+        """The name of the surface below the objects: its rendered material and ``surface``."""
         return f"{self.scene.record.furniture.boxes[0].material} surface"
 
     @cached_property
     def slidable(self) -> list[Seen]:
-        """The named objects that can be slid alone; none where something that could be met is not seen."""
+        """The named objects that can be slid alone; none if an object of the scene is not clear."""
         if not self.view.shows_all:
             return []
         return [each for each in self.named if can_be_slid(each.thing, self.scene.record)]
 
     def words_of(self, seen: Seen) -> str:
-        """Return the words that mean an object."""
+        """Return the reference of an object."""
         return self.words[seen.thing.name]
 
     def called(self, seen: Seen) -> str:
-        """Return the words that mean an object, or its category's where it has none: what a point means already."""
+        """Return the reference of an object, or its category if it has none, for objects that a point identifies."""
         return self.words.get(seen.thing.name, f"the {one_of(seen.thing.category)}")
 
     def way(self, seen: Seen, direction: Direction) -> Way:
-        """Return what an object meets in one of the picture's directions."""
+        """Return the obstacles of an object in one direction."""
         slide = Slide(seen.thing, (0.0, 0.0), direction.vector)
         if _key(slide) not in self.measured.ways:
             self.ways([Slide(each.thing, (0.0, 0.0), d.vector) for each in self.slidable for d in self.directions])
         return self.measured.ways[_key(slide)]
 
     def ways(self, slides: Sequence[Slide]) -> list[Way]:
-        """Return what each slide meets; found once for all pictures of a scene, and cheapest for many at once."""
+        """Return the obstacles of each slide; cached for all pictures of a scene, and fastest for many slides at once."""
         known = self.measured.ways
         new = {_key(each): each for each in slides if _key(each) not in known}
         known.update(zip(new, sweep(list(new.values()), self.things, self.scene.record), strict=True))
         return [known[_key(each)] for each in slides]
 
     def gap_m(self, a: Thing, b: Thing) -> float:
-        """Return the distance of two objects; found once for all pictures of a scene."""
+        """Return the distance between two objects; cached for all pictures of a scene."""
         key = (min(a.name, b.name), max(a.name, b.name))
         gaps_m = self.measured.gaps_m
         if key not in gaps_m:
@@ -114,13 +115,13 @@ class Context:
         return gaps_m[key]
 
     def in_view(self, seen: Seen, end_m: np.ndarray) -> bool:
-        """Whether an object's middle, moved by ``end_m (2,)``, is still in the picture."""
+        """Return whether an object's centre, moved by ``end_m (2,)``, stays in the picture."""
         column, row, depth_m = self.view.pixel(seen.thing.center_m + np.array([*end_m, 0.0]))
         camera = self.view.camera
         return depth_m > 0 and 0 <= column < camera.width_px and 0 <= row < camera.height_px
 
     def names(self, *seen: Seen) -> dict[str, str]:
-        """Return categories by object's name: part of every answer's evidence."""
+        """Return the categories by object name, which are part of every answer's evidence."""
         return {each.thing.name: each.thing.category for each in seen}
 
 
@@ -129,7 +130,7 @@ def _key(slide: Slide) -> SlideKey:
 
 
 def sentence(text: str) -> str:
-    """Return a text with a capital and a full stop."""
+    """Return a text with a capital letter and a full stop."""
     return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"
 
 

@@ -1,4 +1,4 @@
-"""Detection: boxes, counts, and what is there."""
+"""Detection questions: boxes, counts and lists of objects."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from manitwin.scenes.vqa.references import CONTAINERS, a_or_an, could_be_asked_f
 from manitwin.scenes.vqa.things import Seen
 
 APART_SHARE = 0.02
-"""How far (share of the picture's width) each thing of a list is to the right of the one before it, by either middle."""
+"""Least horizontal distance of consecutive objects in a list (share of the picture's width), for both centres."""
 ABSENT = 4
-"""How many categories that are not there are offered for each picture."""
+"""Number of absent categories that each picture is asked about."""
 
 
 def detection(asked: Context) -> Iterator[Draft]:
-    """Ask for boxes, and in pictures without a doubtful object for what is there.
+    """Ask for boxes, and about presence in pictures without doubtful objects.
 
-    What is on the surface is counted and listed where nothing stands on or lies in another thing: of that one may say either.
+    Objects on the surface are counted and listed only if none stands on or lies in another, since counting those is ambiguous.
     """
     yield from _boxes(asked)
     if asked.view.is_sure and len(asked.view.clear) >= 2:
@@ -55,7 +55,7 @@ def _counts(asked: Context) -> Iterator[Draft]:
 
 
 def _existence(asked: Context) -> Iterator[Draft]:
-    """What is there, and what is not: nothing whose noun is that of something there."""
+    """Ask whether categories are present; no absent category shares a noun with a present one."""
     there = {each.thing.category for each in asked.view.clear}
     absent = [category for category in asked.categories if not could_be_asked_for(category, there)]
     for category in sorted(there):
@@ -101,9 +101,10 @@ def _lists(asked: Context) -> Iterator[Draft]:
 
 
 def is_sure_order(middles_px: np.ndarray, least_px: float) -> bool:
-    """Whether each thing is at least so far to the right of the one before it by either of its middles ``(things, 2)`` px.
+    """Return whether each object is at least ``least_px`` to the right of the previous one, by both centres ``(things, 2)`` px.
 
-    These are the mean of its pixels and the middle of its box, far apart of a pan with a long handle: a person may take either.
+    These are the mean of its pixels and the middle of its box; for a pan with a long handle they differ much, and a reader may
+    use either.
     """
     return bool((np.diff(middles_px, axis=0) >= least_px).all())
 

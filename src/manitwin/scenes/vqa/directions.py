@@ -1,4 +1,4 @@
-"""Directions on the level, with the words that say whose they are."""
+"""Horizontal directions, with words that name their frame."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from manitwin.render.cameras import Camera
 
 ALIGNED = 0.94
-"""Least cosine between what the robot and the camera call ahead: within 20 degrees their sides are the same or opposite."""
+"""Least cosine between the forward directions of robot and camera: within 20 degrees their sides agree or are opposite."""
 STEEP = 0.8
-"""Cosine between a camera's view and straight down from which on the picture is one from above."""
+"""Least cosine between a camera's view and straight down for a view from above."""
 FROM_ABOVE = "straight towards the upper edge of the picture", "straight towards the lower edge of the picture"
-"""What is said for away from and towards a camera that looks down."""
+"""The words for away from and towards a camera that looks down."""
 ROBOT_FACES = np.array([1.0, 0.0])
-"""The robot stands at the world's origin and faces +X, +Y is to its left."""
+"""The robot stands at the world's origin and faces +X; +Y is to its left."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +27,13 @@ class Direction:
     words: str
     vector: tuple[float, float]
     robot: str
-    """The sentence that says where the robot stands, with a blank behind it; empty where nothing is the robot's."""
+    """The sentence that states the robot's position, with a trailing space; empty for directions of the picture."""
 
 
 def picture_directions(camera: Camera) -> list[Direction]:
-    """Return right, left, away and towards as the picture shows them, level.
+    """Return right, left, away and towards in the picture, projected onto the horizontal plane.
 
-    Seen from above, towards the camera is up: what goes that way on the level goes to an edge of the picture.
+    In a view from above, away and towards are the upper and lower edge of the picture.
     """
     right = _level(camera.camera_to_object[:3, 0])
     ahead = np.array([-right[1], right[0]])
@@ -48,9 +48,9 @@ def picture_directions(camera: Camera) -> list[Direction]:
 
 
 def robot_directions(camera: Camera, first_object_m: np.ndarray) -> list[Direction]:
-    """Return the robot's right, left, ahead and back, where the picture lets one know them; else none.
+    """Return the robot's right, left, forward and backward, if the picture determines them; else none.
 
-    That is where the camera faces the robot across the objects, or looks the same way; ``first_object_m`` is a world point.
+    It does if the camera faces the robot across the objects, or looks the same way; ``first_object_m`` is a world point.
     """
     right = _level(camera.camera_to_object[:3, 0])
     ahead = np.array([-right[1], right[0]])

@@ -1,4 +1,4 @@
-"""Questions as files: LLaVA's and ShareGPT's JSON, Parquet that Hugging Face's datasets reads, WebDataset's shards."""
+"""File formats of questions: JSON of LLaVA and ShareGPT, Parquet for Hugging Face datasets, WebDataset shards."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from manitwin.twin.store import canonical_json
 
 SHARD_PICTURES = 1000
 PARQUET_ROWS = 2000
-"""Questions of one Parquet file; each has its picture inside."""
+"""Number of questions in one Parquet file, which embeds their pictures."""
 
 
 @dataclass(frozen=True)
 class Pictures:
-    """The pictures by name as JPEG, read when asked for, and the ``size_px`` (width, height) of each."""
+    """The pictures by name as JPEG, read on access, and the ``size_px`` (width, height) of each."""
 
     jpeg: Callable[[str], bytes]
     size_px: Mapping[str, tuple[int, int]]
 
 
 def write_llava(questions: Sequence[Question], pictures: Pictures, convention: str, out: Output) -> None:
-    """Write ``<split>.json`` in the form that LLaVA and ShareGPT's readers take, and ``images/``."""
+    """Write ``<split>.json`` in the format that readers of LLaVA and ShareGPT accept, and ``images/``."""
     for name in sorted({question.picture for question in questions}):
         out.write_bytes(f"images/{name}", pictures.jpeg(name))
     for split, of_split in _by_split(questions).items():
@@ -76,7 +76,7 @@ _FEATURES: dict[str, tuple[pa.DataType, Any]] = {
 
 
 def write_parquet(questions: Sequence[Question], pictures: Pictures, convention: str, out: Output) -> None:
-    """Write ``data/<split>-N-of-M.parquet`` with the pictures inside, and the features that datasets reads from the schema."""
+    """Write ``data/<split>-N-of-M.parquet`` with embedded pictures, and with the features of ``datasets`` in the schema."""
     told = {"info": {"features": {name: feature for name, (_, feature) in _FEATURES.items()}}}
     schema = pa.schema([(name, kind) for name, (kind, _) in _FEATURES.items()])
     schema = schema.with_metadata({"huggingface": json.dumps(told)})
@@ -101,7 +101,7 @@ def _row(question: Question, pictures: Pictures, convention: str) -> dict[str, A
 
 
 def write_webdataset(questions: Sequence[Question], pictures: Pictures, convention: str, out: Output) -> None:
-    """Write ``<split>-NNNNNN.tar``: of each picture ``<key>.jpg`` and ``<key>.json``, the list of its questions."""
+    """Write ``<split>-NNNNNN.tar`` with ``<key>.jpg`` and ``<key>.json``, the list of its questions, for each picture."""
     for split, of_split in _by_split(questions).items():
         by_picture: dict[str, list[Question]] = defaultdict(list)
         for question in of_split:
@@ -137,4 +137,4 @@ FORMATS: Mapping[str, Callable[[Sequence[Question], Pictures, str, Output], None
     "parquet": write_parquet,
     "webdataset": write_webdataset,
 }
-"""The formats by name."""
+"""The writers by the name of their format."""

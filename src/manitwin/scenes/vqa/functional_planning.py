@@ -1,4 +1,4 @@
-"""Functional planning: parts, interaction points, grasp types and what objects are for."""
+"""Functional planning questions: parts, interaction points, grasp types and functions of objects."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from manitwin.scenes.vqa.question import CHOICE, POINT, YES_NO, Draft
 from manitwin.scenes.vqa.things import Seen, Thing, inner_point, part_alone_px
 
 PART_SEEN_SHARE, PART_PX = 0.20, 100
-"""A part is seen with so much of the pixels that it alone would cover, and so many."""
+"""A part is visible if this share of the pixels that it alone would cover is visible, and this number of pixels."""
 MOST_OPTIONS = 4
 
 
 def functional_planning(asked: Context) -> Iterator[Draft]:
-    """Ask where and how to touch objects, and what they serve for."""
+    """Ask where and how to touch objects, and about their functions."""
     for seen in asked.named:
         yield from _parts(asked, seen)
         yield from interaction_points(asked, seen)
@@ -62,7 +62,7 @@ def _parts(asked: Context, seen: Seen) -> Iterator[Draft]:
 
 
 def _functions(asked: Context) -> Iterator[Draft]:
-    """Functions are told apart by all of their words: ``serving food`` is not asked where another serves food too."""
+    """Ask for the object with a function; none of its content words may occur in the function of another pointed object."""
     told = [(seen, point, _function(seen.thing)) for seen, point in asked.pointed]
     for seen, _, function in told:
         others = [each for each in told if not _content(each[2]) & _content(function)]
@@ -89,7 +89,7 @@ _SAME = {
     **dict.fromkeys(("drinks", "drinking", "tea", "coffee", "wine", "water", "soda", "beer", "juice", "milk"), "drink"),
     **dict.fromkeys(("eating", "meals", "soup", "cereal", "snacks"), "food"),
 }  # fmt: skip
-"""Words for what one thing serves as well as another: who holds hot drinks in a mug may do so in a cup for tea."""
+"""Words that count as one: a mug for hot drinks also serves for tea."""
 
 
 def _content(function: str | None) -> set[str]:

@@ -1,4 +1,4 @@
-"""Questions about the pictures of scenes: drafted by scene, chosen over all, and put into words."""
+"""Generation of questions about the pictures of scenes: drafting by scene, selection over all scenes, and wording."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from manitwin.scenes.vqa.templates import FAMILIES
 from manitwin.scenes.vqa.things import Shape, things_of, views_of
 
 MOST_DRAFTS = 24
-"""How many drafts of a family (and answer) one scene keeps."""
+"""Maximal number of drafts of a family (and answer, for yes/no questions) that one scene keeps."""
 _MAKERS: Sequence[Callable[[Context], Iterable[Draft]]] = (
     language_grounding,
     functional_planning,
@@ -36,9 +36,9 @@ _MAKERS: Sequence[Callable[[Context], Iterable[Draft]]] = (
 
 
 def drafts_of(scene: SceneTruth, shape_of: Callable[[str], Shape], categories: Sequence[str], seed: int) -> list[Draft]:
-    """Return all that may be asked about the pictures of a scene; raises TwinError, UsageError.
+    """Return the drafts of all possible questions about the pictures of a scene; raises TwinError, UsageError.
 
-    ``categories`` are those of all scenes, of which absent ones are asked about.
+    ``categories`` are those of all scenes; absent ones are asked about.
     """
     things = things_of(scene, shape_of)
     found: list[Draft] = []
@@ -52,13 +52,13 @@ def drafts_of(scene: SceneTruth, shape_of: Callable[[str], Shape], categories: S
 
 
 def _with_words(draft: Draft, context: Context) -> dict[str, Any]:
-    """Return a draft's evidence, with the words that mean each of its objects."""
+    """Return a draft's evidence, with the references of its objects."""
     called = {name: context.words[name] for name in draft.evidence["objects"] if name in context.words}
     return {**draft.evidence, "called": called}
 
 
 def _thinned(drafts: Sequence[Draft], rng: random.Random) -> list[Draft]:
-    """Keep so many drafts of each family and, of yes/no questions, of each answer: a thousand scenes fit into memory."""
+    """Limit the drafts of each family and, for yes/no questions, of each answer, so that a thousand scenes fit into memory."""
     sides: dict[tuple[str, str], list[Draft]] = defaultdict(list)
     for draft in drafts:
         sides[draft.family, draft.answer if draft.kind == YES_NO else ""].append(draft)
@@ -74,9 +74,9 @@ def questions_of(
     seed: int,
     wordings_for: Callable[[Sequence[str]], Mapping[str, Sequence[str]]] = lambda families: {},
 ) -> list[Question]:
-    """Choose among the drafts of scenes and put them into words: in the split ``val`` into the paraphrases that are held out.
+    """Select among the drafts of scenes and word them; the split ``val`` uses the held-out paraphrases.
 
-    ``wordings_for`` returns further wordings of the families that are asked, for the other split.
+    ``wordings_for`` returns more wordings of the selected families, for the other split.
     """
     picked = chosen(drafts, per_scene, random.Random(_seed(seed, "chosen")))
     asked = {draft.family for of_scene in picked for draft in of_scene}
@@ -101,7 +101,7 @@ def _worded(
     last = len(family.paraphrases) - 1
     template = last if held_out else rng.randrange(last + len(more))
     if not held_out and template >= last:
-        template += 1  # behind the one that is held out
+        template += 1  # skip the held-out paraphrase
     wordings = (*family.paraphrases, *more)
     text = filled(wordings[template], draft.slots)
     draft = _shuffled(draft, rng)
@@ -114,7 +114,7 @@ def _worded(
 
 
 def _shuffled(draft: Draft, rng: random.Random) -> Draft:
-    """Put the options into a random order; numbers, directions and what the question has in its words stay as they are."""
+    """Shuffle the options, except those in a fixed order: yes and no, numbers, sides, and options named in the question."""
     if draft.kind == YES_NO:
         return replace(draft, options=("yes", "no"))
     if draft.kind != CHOICE or draft.family in IN_ORDER:

@@ -1,4 +1,4 @@
-"""The grasp type that suits an object best, and what grasp types are called."""
+"""The best grasp type of an object, and the words for grasp types."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ GRASP_WORDS = {
     "three_finger": "a three-finger grasp",
     "enveloping": "an enveloping grasp",
 }
-"""The paper's five types."""
+"""The five grasp types of the paper."""
 LEAST_LEAD = 0.02
-"""How far the confidence of the best grasp type is above that of the next one."""
+"""Least lead of the best grasp type's confidence over that of the next one."""
 
 
 def best_grasp(thing: Thing) -> tuple[str, float, float] | None:
-    """Return the type of the surest grasp point, its confidence and its lead before other types; None where none leads."""
+    """Return the type with the most confident grasp point, its confidence and its lead over other types; None if none leads."""
     best: dict[str, float] = {}
     points = thing.shape.twin.record.points
     for point in points.grasp if points else ():

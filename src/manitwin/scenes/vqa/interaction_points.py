@@ -1,4 +1,4 @@
-"""Functional points: where they are in a picture, and whether another object hides them."""
+"""Questions about functional points: their place in a picture, and whether another object occludes them."""
 
 from __future__ import annotations
 
@@ -18,21 +18,22 @@ from manitwin.scenes.vqa.things import Seen
 from manitwin.twin.point_records import FunctionalFrame, FunctionalPoint
 
 AROUND_M, AROUND_SHARE = 0.010, 0.10
-"""All of the surface within so far of an interaction point, and such a share of its object's length, is seen, or is hidden."""
+"""Radius (m, share of the object's length) around an interaction point whose whole surface must be visible, or occluded."""
 INTO_COSINE = np.cos(np.radians(65))
-"""An opening is looked into where its axis is so near to the line of sight."""
+"""Least cosine between an opening's axis and the line of sight at which the camera looks into it."""
 OPEN_SHARE = 0.8
-"""The share of an opening's radius that is looked at: its rim is not in question."""
+"""Share of an opening's radius that is tested, which excludes its rim."""
 COVERED_SHARE = 0.02
-"""An object of which another hides less is not covered."""
+"""An object is uncovered if at most this share of its silhouette in the frame is hidden."""
 POINT_DEPTH_M, IN_FRONT_M = 0.006, 0.015
-"""A point is seen where the picture's depth is its own; it is hidden by what is so much nearer."""
+"""Tolerance between a visible point's depth and the picture's, and least depth difference of an occluder."""
 
 
 @dataclass(frozen=True)
 class _Place:
-    """A point in the world ``(3,)``, and the pixels ``(N, 2)`` (row, column) that would show what is around it, were its
-    object alone; ``on_surface``: the picture's depth there is the point's own, else that of what lies behind it.
+    """A point in the world ``(3,)`` and the pixels ``(N, 2)`` (row, column) that would show its surroundings if unoccluded.
+
+    ``on_surface``: a visible point has the picture's depth; else the picture shows what lies behind it.
     """
 
     point_m: np.ndarray
@@ -41,7 +42,7 @@ class _Place:
 
 
 def interaction_points(asked: Context, seen: Seen) -> Iterator[Draft]:
-    """Ask of each functional point that has one place whether another object hides it."""
+    """Ask for each functional point with a unique label whether another object occludes it."""
     points = seen.thing.shape.twin.record.points
     words, camera = asked.words_of(seen), asked.view.camera
     labels = [point.label for point in points.functional] if points else []
@@ -79,9 +80,9 @@ def interaction_points(asked: Context, seen: Seen) -> Iterator[Draft]:
 
 
 def _place(asked: Context, seen: Seen, point: FunctionalPoint) -> _Place | None:
-    """Return where a functional point is: an opening's in its middle, any other's on the surface.
+    """Return the place of a functional point: the centre of an opening, otherwise a point on the surface.
 
-    None where the object itself hides it, where the frame cuts off what is around it, or for an opening without a frame.
+    None if the object occludes the point itself, if the frame cuts off its surroundings, or for an opening without a frame.
     """
     if point.label in OPENINGS:
         frame = point.frame
@@ -94,7 +95,7 @@ def _place(asked: Context, seen: Seen, point: FunctionalPoint) -> _Place | None:
 
 
 def _opening(asked: Context, seen: Seen, frame: FunctionalFrame) -> _Place | None:
-    """Return the middle of an opening that the camera looks into, past nothing of the object itself."""
+    """Return the centre of an opening that the camera looks into, without the object itself in between; None if it does not."""
     camera, eye = asked.view.camera, asked.view.camera.position
     rotation = rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz))
     across = np.mgrid[-1:1:9j, -1:1:9j].reshape(2, -1).T
@@ -113,7 +114,7 @@ def _opening(asked: Context, seen: Seen, frame: FunctionalFrame) -> _Place | Non
 
 
 def _is_inside(asked: Context, world_m: np.ndarray) -> bool:
-    """Whether a point is in the picture, and not at its border."""
+    """Return whether a point is in the picture, and not at its border."""
     camera = asked.view.camera
     column, row, _ = asked.view.pixel(world_m)
     edge_px = LEAST_INNER_PX * camera.width_px / 512
@@ -121,9 +122,9 @@ def _is_inside(asked: Context, world_m: np.ndarray) -> bool:
 
 
 def _around(asked: Context, seen: Seen, world_m: np.ndarray) -> np.ndarray | None:
-    """Return the pixels ``(N, 2)`` (row, column) that would show the object's surface near a point of it, were it alone.
+    """Return the pixels ``(N, 2)`` (row, column) that would show the object's surface near one of its points if unoccluded.
 
-    None where the frame cuts them off.
+    None if the frame cuts them off.
     """
     camera, thing = asked.view.camera, seen.thing
     radius_m = max(AROUND_M, AROUND_SHARE * thing.longest_m)
@@ -144,7 +145,7 @@ def _around(asked: Context, seen: Seen, world_m: np.ndarray) -> np.ndarray | Non
 
 
 def _shows_part(asked: Context, seen: Seen, label: str) -> bool:
-    """Whether the picture shows some of a part that is called as an interaction point is: where on it that is, it does not."""
+    """Return whether the picture shows some of a part with the label of the point, whose place on the part is then unclear."""
     numbers = [
         number for number, each in asked.scene.parts.items()
         if each.object == seen.thing.name
@@ -154,13 +155,13 @@ def _shows_part(asked: Context, seen: Seen, label: str) -> bool:
 
 
 def _faces_camera(asked: Context, seen: Seen, world_m: np.ndarray) -> bool:
-    """Whether the object alone would let the camera see a point of it."""
+    """Return whether the object alone leaves one of its points visible to the camera."""
     met_m, lengths_m = _met_alone(asked, seen, world_m[None])
     return bool(abs(met_m[0] - lengths_m[0]) < POINT_DEPTH_M)
 
 
 def _met_alone(asked: Context, seen: Seen, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far the object alone is on the way from the camera to each point ``(N, 3)``, and how far the point is."""
+    """Return the distances from the camera to the object alone along the ray to each point ``(N, 3)``, and to the point."""
     eye = asked.view.camera.position
     lengths_m = np.linalg.norm(points_m - eye, axis=1)
     to_thing = inverse(seen.thing.pose)

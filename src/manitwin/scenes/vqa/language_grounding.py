@@ -1,4 +1,4 @@
-"""Language grounding: from words to places in the picture and back."""
+"""Language grounding questions: from words to places in the picture and back."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ QUARTERS = ("top left", "top right", "bottom left", "bottom right")
 
 
 def language_grounding(asked: Context) -> Iterator[Draft]:
-    """Ask for places of objects, and for the objects at places."""
+    """Ask for the places of objects, and for the objects at places."""
     yield from _points(asked)
     yield from _objects_at_points(asked)
     yield from _by_color(asked)
@@ -87,7 +87,7 @@ def _regions(asked: Context) -> Iterator[Draft]:
 
 
 def _place(asked: Context, seen: Seen, point: Point) -> str | None:
-    """Return the ninth of the picture that holds an object's point and the middle of its box; None where they differ."""
+    """Return the ninth of the picture that contains an object's point and the centre of its box; None if they differ."""
     box, camera = seen.view.visible_box, asked.view.camera
     if box is None:
         return None

@@ -1,4 +1,4 @@
-"""Logistic regression on words: what a question's words alone tell of its answer."""
+"""Logistic regression on words: how well the words of a question predict its answer."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from scipy.optimize import minimize
 from scipy.sparse import csr_matrix
 
 PENALTY = 1.0
-"""Of half the squared weights (L2): scikit-learn's default, C = 1."""
+"""The weight of half the squared weights (L2): the default of scikit-learn, C = 1."""
 
 
 @dataclass(frozen=True)
 class WordModel:
-    """Weights by word and a bias."""
+    """Weights by word, and a bias."""
 
     weights: dict[str, float]
     bias: float
 
     @classmethod
     def fitted(cls, texts: Sequence[Iterable[str]], answers: Sequence[bool]) -> WordModel:
-        """Fit to the words of some texts and the answer of each, by L-BFGS; the same input gives the same weights."""
+        """Fit the words of texts to their answers by L-BFGS; the same input gives the same weights."""
         rows = [sorted(set(text)) for text in texts]
         place = {word: number for number, word in enumerate(sorted({word for row in rows for word in row}))}
         starts = np.cumsum([0, *map(len, rows)])
@@ -41,6 +41,6 @@ class WordModel:
         return cls({word: float(found[number]) for word, number in place.items()}, float(found[-1]))
 
     def probability(self, text: Iterable[str]) -> float:
-        """Return the probability of yes."""
+        """Return the probability of a positive answer."""
         score = self.bias + sum(self.weights.get(word, 0.0) for word in set(text))
         return float(1 / (1 + np.exp(-np.clip(score, -500, 500))))

@@ -1,4 +1,4 @@
-"""The nouns that a category may be called by: a wine glass is a glass, a magnifying glass is none, a mug may be called a cup."""
+"""Nouns of categories: a wine glass is a glass, a magnifying glass is not, a mug may be called a cup."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ OF_ANOTHER_KIND = frozenset(
         "hair clipper", "nail clipper", "computer mouse", "toy bucket", "toy hammer", "toy car",
     }
 )  # fmt: skip
-"""Names whose last word means another kind of thing where it stands alone: their noun is all of the name."""
+"""Names whose last word alone means another kind of thing: their noun is the whole name."""
 
 
 PAIRS = frozenset(
     {"headphones", "earphones", "scissors", "shears", "pliers", "tongs", "tweezers", "glasses", "sunglasses", "goggles"}
 )
-"""Nouns that are plural, of which one is a pair."""
+"""Plural nouns whose unit is a pair."""
 
 
 def noun_of(category: str) -> str:
-    """Return the noun of a category: ``bottle`` of ``ketchup bottle``, and ``magnifying glass`` of that."""
+    """Return the noun of a category: ``bottle`` for ``ketchup bottle``, but ``magnifying glass`` for itself."""
     return category if category in OF_ANOTHER_KIND else category.split()[-1]
 
 
 @cache
 def counter_of(category: str) -> str | None:
-    """Return what one of a category is counted by: ``pair of`` scissors, a ``bar of`` soap; None of what counts by itself."""
+    """Return the counter of a category: ``pair of`` scissors, a ``bar of`` soap; None for countable nouns."""
     if category.split()[-1] in PAIRS:
         return "pair of"
     prior = prior_names.named(category)
@@ -41,8 +41,11 @@ def counter_of(category: str) -> str | None:
 
 @cache
 def nouns_of(category: str) -> frozenset[str]:
-    """Return every noun that somebody may call a thing by: its own, those of its parts (of a cup and saucer), and those of the
-    priors' other names for it (a mug is a coffee cup)."""
+    """Return every noun that may denote a category.
+
+    These are its own noun, those of its components (of a cup and saucer), and those of its aliases in the priors (a mug is a
+    coffee cup).
+    """
     prior = prior_names.named(category)
     names = {category, *(prior.aliases if prior is not None else ())}
     found = {noun_of(each) for name in names for each in name.split(" and ")}

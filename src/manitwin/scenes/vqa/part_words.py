@@ -1,4 +1,4 @@
-"""Words of parts and points: which of them mean one place that a picture tells."""
+"""Words for parts and points, and which of them identify one place in a picture."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ ALL_ROUND = frozenset(
         "wall", "end", "far end", "end flap", "edge", "ear cup", "front", "back", "hole", "bore",
     }
 )  # fmt: skip
-"""Labels of what goes around a thing or along it, or is there twice: which place is meant, a picture does not tell."""
+"""Labels of features that extend around or along an object or occur twice, so that a picture does not identify the place."""
 OPENINGS = frozenset({"opening", "mouth"})
-"""Labels of what is meant by its middle, which is not on the surface."""
+"""Labels of features that are located by their centre, which is not on the surface."""
 WIDE = ALL_ROUND - {"base", "neck", "shaft", "top", "front", "back"}
-"""Names of parts of which a person sees some where the labels have another part: the body of a pan is its inside too."""
+"""Names of parts that a reader may see where the labels show another part: the body of a pan includes its inside."""
 SIDES_OF_WHAT_STANDS = frozenset({"top", "bottom", "underside"})
-"""Names of sides that are those above and below: of a thing that stands as it is made, and of no other."""
+"""Names of sides that are up or down, which hold only for an object that stands upright."""
 UNTOLD_SIDES = frozenset({"front", "back", "side", "left side", "right side"})
-"""Names of sides that nothing in the picture tells from the others."""
+"""Names of sides that a picture does not distinguish."""
 STANDS_RAD = np.radians(12)
 PART_GONE_PX = 2
-"""A part is not seen with so few pixels (of a picture of 512 x 512)."""
+"""A part is invisible if no more pixels show it (of a picture of 512 x 512)."""
 
 
 def is_told(name: str, thing: Thing) -> bool:
-    """Whether a picture tells which place of a thing a part's name means: a box that lies has no top."""
+    """Return whether a picture identifies the place that a part's name denotes: a box that lies has no top."""
     word = name.casefold()
     return word not in UNTOLD_SIDES and (word not in SIDES_OF_WHAT_STANDS or stands(thing))
 
 
 def stands(thing: Thing) -> bool:
-    """Whether +Z of a thing's frame is upward."""
+    """Return whether +Z of an object's frame points up."""
     return bool(thing.pose[2, 2] >= np.cos(STANDS_RAD))

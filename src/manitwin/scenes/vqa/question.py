@@ -1,4 +1,4 @@
-"""Questions and answers about one picture: the one truth that every format is written from."""
+"""Questions and answers about one picture, independent of the file format."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ LANGUAGE, FUNCTION, SCENE, TASK, DETECTION = (
     "Detection",
 )
 CATEGORIES = (LANGUAGE, FUNCTION, SCENE, TASK, DETECTION)
-"""The paper's five, by its names (section "VQA Data Generation")."""
+"""The five categories of the paper, by its names (section "VQA Data Generation")."""
 
 YES_NO, CHOICE, POINT, BOX, NUMBER, LIST, TEXT = "yes/no", "choice", "point", "box", "number", "list", "text"
 CLOSED = (YES_NO, CHOICE)
-"""Kinds whose answer is one of a few that the question names."""
+"""Kinds whose answer is one of a few options."""
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -26,11 +26,11 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Draft:
-    """A question before its words are chosen: ``slots`` are put into a template of the family.
+    """A question before wording: ``slots`` fill a template of the family.
 
-    ``answer`` is short, ``response`` a sentence. Both, the slots and the ``options`` may hold ``<p0>``, ``<b0>`` ..., which stand
-    for ``points`` (x, y) and ``boxes`` (x, y, width, height) in shares of the picture's width and height from its upper left
-    corner. ``evidence`` holds what the answer was computed from: names of objects, measured values (SI), margins.
+    ``answer`` is short, ``response`` is a sentence. Both, the slots and the ``options`` may contain ``<p0>``, ``<b0>`` ...,
+    which stand for ``points`` (x, y) and ``boxes`` (x, y, width, height) as shares of the picture's width and height from its
+    upper left corner. ``evidence`` contains the inputs of the answer: names of objects, measured values (SI), margins.
     """
 
     family: str
@@ -47,9 +47,9 @@ class Draft:
 
 @dataclass(frozen=True)
 class Question:
-    """A question with its words; ``template`` counts the family's paraphrases, ``held_out`` is one that only ``val`` has.
+    """A question with its words; ``template`` is the index of its paraphrase, ``held_out`` marks one that only ``val`` uses.
 
-    ``rephrased``: its words are a model's; the answer never is.
+    ``rephrased``: a model wrote the wording; the answer is always computed.
     """
 
     question_id: str
@@ -72,9 +72,9 @@ class Question:
 
     @property
     def picture(self) -> str:
-        """The name of its picture, without a folder."""
+        """The file name of its picture, without a folder."""
         return f"{self.scene_id}_{self.camera}.jpg"
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON values."""
+        """Return the question as JSON values."""
         return {**asdict(self), "picture": self.picture}

@@ -1,4 +1,4 @@
-"""Words that mean one object of a picture and no other."""
+"""Referring expressions: words that identify one object of a picture."""
 
 from __future__ import annotations
 
@@ -11,26 +11,27 @@ from manitwin.scenes.vqa.nouns import counter_of, noun_of, nouns_of
 from manitwin.scenes.vqa.things import Seen, Thing, View
 
 MARGIN_PX = 40
-"""How far the outermost of some objects is beyond the next (px of a picture 512 wide)."""
+"""Least distance of the outermost object from the next (px of a picture 512 wide)."""
 CONTAINERS = ("mug", "cup", "bowl", "bottle", "jar", "can")
 """The nouns that questions about containers name."""
 OTHER_VESSELS = (
     "box", "container", "pan", "pot", "vase", "shaker", "plate", "tray", "basket", "bucket", "kettle", "jug", "pitcher",
     "glass", "carton", "tin", "tube", "bag", "case", "shoe", "bin", "crate", "dispenser", "canister", "holder", "teapot",
 )  # fmt: skip
-"""Nouns of what somebody may call a container: where one is in view, containers are not asked about."""
+"""Nouns that may be called containers: in views with one of them, containers are not asked about."""
 _GENERAL = {"container": (*CONTAINERS, *OTHER_VESSELS)}
-"""Nouns that are also true of other nouns."""
+"""Nouns that also apply to objects with other nouns."""
 
 REGION_MARGIN = 0.03
-"""How far from the border of two regions (share of the picture) what is said to lie in one is."""
+"""Least distance of a point from the border between two regions (share of the picture)."""
 
 
 def references(view: View, rng: random.Random) -> dict[str, str]:
-    """Return by object's name words such as ``the yellow bottle`` for each clear object that has some of its own.
+    """Return a reference such as ``the yellow bottle`` by object name, for each clear object that has a unique one.
 
-    An object's rivals are those that its noun may mean too, and of which anything may be seen. First its category alone, with its
-    colour now and then; else its colour, where all rivals have others; else that it is the outermost of its kind in the picture.
+    The rivals of an object are the visible objects that its noun may also denote. Without rivals, its category is used, at
+    random with its colour; with rivals, its colour if all rivals have others, else that it is the outermost of its kind in the
+    picture.
     """
     found = {}
     shown = [each for each in view.seen if not each.is_hidden]
@@ -43,7 +44,7 @@ def references(view: View, rng: random.Random) -> dict[str, str]:
 
 
 def _may_be_called(other: Seen, thing: Thing) -> bool:
-    """Whether the noun of a thing may mean another one too: beside an allen key, a door key is not surely "the key"."""
+    """Return whether the noun of an object may denote another one too: an allen key and a door key may both be "the key"."""
     noun = thing.head
     names_it = noun == thing.category == other.thing.category.split()[-1]
     return names_it or noun in nouns_of(other.thing.category) or other.thing.head in _GENERAL.get(noun, ())
@@ -68,9 +69,9 @@ def _words(seen: Seen, rivals: list[Seen], rng: random.Random, margin_px: float)
 
 
 def region(x: float, y: float) -> str | None:
-    """Return which ninth of the picture a point lies in, in words; ``x`` and ``y`` in shares of its size.
+    """Return the words for the ninth of the picture that contains a point; ``x`` and ``y`` in shares of its size.
 
-    None for a point within ``REGION_MARGIN`` of a border, of which the eye cannot tell.
+    None for a point within ``REGION_MARGIN`` of a border, whose region is ambiguous.
     """
     if any(abs(place - border) < REGION_MARGIN for place in (x, y) for border in (1 / 3, 2 / 3)):
         return None
@@ -80,19 +81,19 @@ def region(x: float, y: float) -> str | None:
 
 
 def one_of(noun: str, color: str | None = None) -> str:
-    """Return the words for one thing: ``black pair of scissors``, ``yellow bottle``, ``bar of soap``."""
+    """Return the words for one object: ``black pair of scissors``, ``yellow bottle``, ``bar of soap``."""
     counter = counter_of(noun)
     thing = noun if counter is None else f"{counter} {noun}"
     return f"{color} {thing}" if color else thing
 
 
 def a_or_an(noun: str) -> str:
-    """Return a noun with its article."""
+    """Return a noun with its indefinite article."""
     return f"{article(noun)} {noun}"
 
 
 def could_be_asked_for(category: str, present: Collection[str]) -> bool:
-    """Whether somebody who looks for a category may take one of the categories that are ``present`` for it."""
+    """Return whether a reader may take one of the ``present`` categories for a category."""
     vessels = {noun_of(each) for each in present} & {*CONTAINERS, *OTHER_VESSELS}
     names = frozenset().union(*(nouns_of(each) | {each.split()[-1]} for each in present))
     return bool((nouns_of(category) | {category.split()[-1]}) & names) or (
@@ -101,7 +102,7 @@ def could_be_asked_for(category: str, present: Collection[str]) -> bool:
 
 
 def is_container(category: str) -> bool | None:
-    """Whether a category is one of ``CONTAINERS``; None of what somebody may or may not call a container."""
+    """Return whether a category is one of ``CONTAINERS``; None for one that some readers may call a container."""
     noun = noun_of(category)
     if noun in CONTAINERS:
         return True

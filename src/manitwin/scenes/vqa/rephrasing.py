@@ -1,4 +1,4 @@
-"""Further wordings of questions, by a model: kept only where each slot and each word that decides the answer survives."""
+"""Rephrasing of questions by a model; a wording is kept only if all slots and all words that decide the answer survive."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from manitwin.models.vlm.structured import ask
 from manitwin.scenes.vqa.templates import FAMILIES
 
 WORDINGS = 8
-"""How many a family's model is asked for."""
+"""Number of wordings that the model is asked for in each family."""
 MOST_CHARACTERS = 240
 FRAME_SLOTS = ("robot", "size")
-"""The sentences that say where the robot stands and how large a thing is: they come first."""
+"""Slots for the sentences on the robot's position and an object's size, which must come first."""
 HELD_OUT_OVERLAP = 0.8
-"""A wording that shares so much of its words with the one held out (intersection by union) is that one."""
+"""A wording with at least this word overlap with the held-out paraphrase (intersection over union) counts as that paraphrase."""
 _SLOT = re.compile(r"\{([A-Za-z0-9]+)\}")
 _DECIDING = frozenset(
     (
@@ -34,7 +34,7 @@ _DECIDING = frozenset(
         "only", "both", "either", "each", "any", "robot", "camera", "picture", "image",
     )
 )  # fmt: skip
-"""Words on which an answer hangs: those of all the family's own wordings must stay, those of none must not come."""
+"""Words that decide the answer: those in all of the family's own wordings must stay, those in none must not be added."""
 _SIDES = frozenset(("left", "right"))
 
 ASK = (
@@ -61,7 +61,7 @@ class Wordings(BaseModel):
 
 
 class SameQuestions(BaseModel):
-    """A model's answer: the numbers of the wordings that ask the same."""
+    """A model's answer: the numbers of the wordings that ask the same question."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -70,7 +70,7 @@ class SameQuestions(BaseModel):
 
 @dataclass(frozen=True)
 class Rephrasing:
-    """A wording that a model gave for a family; ``dropped`` says why it is not used, None: it is."""
+    """A wording that a model gave for a family; ``dropped`` is the reason for rejection, or None."""
 
     family: str
     text: str
@@ -78,9 +78,9 @@ class Rephrasing:
 
 
 def rephrasings(families: Iterable[str], chat: ChatModel, count: int = WORDINGS) -> list[Rephrasing]:
-    """Ask a model for ``count`` wordings of each family, and again which of those that keep their slots ask the same.
+    """Ask a model for ``count`` wordings of each family, then which of those that pass the checks ask the same question.
 
-    Raises what the model raises, BadReply for an answer that is not of the schema.
+    Raises the errors of the model, and BadReply for an answer that does not match the schema.
     """
     found: list[Rephrasing] = []
     for family in families:
@@ -101,7 +101,7 @@ def rephrasings(families: Iterable[str], chat: ChatModel, count: int = WORDINGS)
 
 
 def kept_wordings(found: Sequence[Rephrasing]) -> dict[str, tuple[str, ...]]:
-    """Return the wordings that are used, by family."""
+    """Return the kept wordings by family."""
     kept: dict[str, tuple[str, ...]] = {}
     for each in found:
         if each.dropped is None:
@@ -110,7 +110,7 @@ def kept_wordings(found: Sequence[Rephrasing]) -> dict[str, tuple[str, ...]]:
 
 
 def rephrasings_json(found: Sequence[Rephrasing], model: str) -> dict[str, Any]:
-    """Return what a model gave, what of it is used, and why the rest is not, as JSON values."""
+    """Return the wordings of a model as JSON values: those kept, and those dropped with the reason."""
     families: dict[str, dict[str, list[Any]]] = {}
     for each in found:
         told = families.setdefault(each.family, {"kept": [], "dropped": []})
@@ -122,7 +122,7 @@ def rephrasings_json(found: Sequence[Rephrasing], model: str) -> dict[str, Any]:
 
 
 def why_not(family: str, text: str) -> str | None:
-    """Say why a wording cannot stand for a family's own, by a reason code; None where it can."""
+    """Return the reason code why a wording is rejected; None if it is accepted."""
     *own, held_out = FAMILIES[family].paraphrases
     if not 8 <= len(text) <= MOST_CHARACTERS or printable_line(text) != text or text.strip()[-1] not in "?.":
         return "no_question"
@@ -145,7 +145,7 @@ def why_not(family: str, text: str) -> str | None:
 
 
 def filled(template: str, slots: Mapping[str, str]) -> str:
-    """Return a wording with its slots filled, and a capital at the beginning of each sentence."""
+    """Return a wording with its slots filled, and with a capital letter at the start of each sentence."""
     text = ""
     for part in re.split(r"(\{[A-Za-z0-9]+\})", template):
         slot = _SLOT.fullmatch(part)
@@ -175,7 +175,7 @@ def _same(original: str, texts: Sequence[str], chat: ChatModel) -> frozenset[str
 
 
 def _slots(text: str) -> list[str]:
-    """Return the slots of a wording; a capital one is the same thing at a sentence's beginning."""
+    """Return the slots of a wording; a capital slot is the same slot at the start of a sentence."""
     return sorted(name.lower() for name in _SLOT.findall(text))
 
 

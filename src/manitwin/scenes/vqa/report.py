@@ -1,4 +1,4 @@
-"""The page of questions: samples with their pictures, the balance of the answers, what words alone give away, and counts."""
+"""Report page of questions: samples with their pictures, the balance of answers, the text-only baseline, and counts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MARK_BGR, _RIM_BGR = (60, 60, 240), (255, 255, 255)
 def vqa_page(
     questions: Sequence[Question], rgb_of: Callable[[Question], np.ndarray], convention: str, scenes: int
 ) -> bytes:
-    """Return the page; ``rgb_of`` gives a question's picture ``(H, W, 3) uint8``."""
+    """Return the page; ``rgb_of`` returns a question's picture ``(H, W, 3) uint8``."""
     categories = Counter(question.category for question in questions)
     lead = [
         f"{len(questions):,} questions about {len({each.picture for each in questions}):,} pictures of {scenes:,} scenes,"
@@ -42,7 +42,7 @@ def vqa_page(
 
 
 def _samples(questions: Sequence[Question]) -> list[Question]:
-    """The first question of each family."""
+    """Return the first question of each family."""
     first: dict[str, Question] = {}
     for question in questions:
         first.setdefault(question.family, question)
@@ -50,7 +50,7 @@ def _samples(questions: Sequence[Question]) -> list[Question]:
 
 
 def marked(rgb: np.ndarray, question: Question) -> np.ndarray:
-    """Draw a question's points (numbered where there are several) and boxes into a copy of its picture."""
+    """Draw a question's points (numbered if there are several) and boxes into a copy of its picture."""
     drawn = np.ascontiguousarray(rgb[..., ::-1])
     height, width = drawn.shape[:2]
     scale = max(1, width // 256)
@@ -91,7 +91,7 @@ def _counts(questions: Sequence[Question]) -> Table:
 
 
 def _blind(questions: Sequence[Question]) -> Table:
-    """Each half of the scenes is answered by a reader trained on the other."""
+    """Return the table of the text-only baseline, with two-fold cross-validation over the scenes."""
     scenes = sorted({question.scene_id for question in questions})
     halves = ([q for q in questions if q.scene_id in set(scenes[side::2])] for side in (0, 1))
     first, second = halves

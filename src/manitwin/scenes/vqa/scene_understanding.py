@@ -1,4 +1,4 @@
-"""Scene understanding: sides, gaps, neighbours, clearance, heights and what hides what."""
+"""Scene understanding questions: sides, gaps, neighbours, clearance, heights and occlusion."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from manitwin.scenes.vqa.sweeps import LONGEST_M, Way
 from manitwin.scenes.vqa.things import Shape
 
 SIDE_M, SIDE_PX = 0.06, 50
-"""How far apart two objects are whose sides are asked."""
+"""Least distance between two objects in a question about sides."""
 NEARER_M, TALLER_M = 0.02, 0.015
 STEEPEST_RAD = np.radians(60)
-"""A camera that looks down more steeply does not show which of two things rises higher."""
+"""Steepest camera for comparing heights: a steeper one does not show which object is higher."""
 FLATTEST_RAD = np.radians(45)
-"""A camera that looks down less steeply foreshortens gaps by more than 30 %."""
+"""Flattest camera for gaps: a flatter one foreshortens gaps by more than 30 %."""
 WHOLE_SHARE = 0.95
-"""What gives a picture its scale is seen by so much."""
+"""Least visible share of the object that gives the scale of a picture."""
 LEAST_TOLERANCE_CM, TOLERANCE_SHARE = 1.0, 0.2
 """A gap is right within the larger of these."""
 FARTHEST_GAP_M = 0.40
 CLEARANCES_CM = (3, 5, 8, 12, 16)
 MOST_OPTIONS = 4
 HIDING_PX, HIDING_SHARE = 60, 0.8
-"""What is said to hide an object hides so much of it, and so much of all that is hidden."""
+"""An occluder hides at least this many pixels of an object, and this share of all its hidden pixels."""
 
 
 def scene_understanding(asked: Context) -> Iterator[Draft]:
-    """Ask how objects stand to each other."""
+    """Ask about spatial relations between objects."""
     yield from _sides(asked)
     yield from _gaps(asked)
     yield from _neighbours(asked)
@@ -66,7 +66,7 @@ def _sides(asked: Context) -> Iterator[Draft]:
 
 
 def sides_are_apart(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Whether neither of two spans holds the middle of the other: of what reaches beyond another the side is in doubt."""
+    """Return whether neither of two intervals contains the middle of the other; otherwise the side is ambiguous."""
     middles = sum(one) / 2, sum(other) / 2
     return not one[0] <= middles[1] <= one[1] and not other[0] <= middles[0] <= other[1]
 

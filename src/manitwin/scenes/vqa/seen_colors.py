@@ -1,4 +1,4 @@
-"""The colour that a picture shows of an object: what leads of the surface as a whole may lie on its far side."""
+"""The colour of an object in a picture: the leading colour of its whole surface may lie on the far side."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from manitwin.render.raycast import cast_pixels
 from manitwin.twin.loaded_twin import Twin
 
 SURE_PERCENT, SURE_GREY_PERCENT, LEAD_PERCENT = 50, 80, 10
-"""A colour is named where it covers so much, and so much more than the next; greys catch the eye less."""
+"""A colour is named if it covers this percentage, with this lead over the next; greys are less salient and need more."""
 GREYS = ("white", "grey", "black")
 _MOST_PX = 256
 
 
 def main_word(color: str) -> str:
-    """Return ``green`` of ``dark green``."""
+    """Return the last word of a colour, ``green`` for ``dark green``."""
     return color.split()[-1]
 
 
 def leading(found: Sequence[tuple[str, float]]) -> str | None:
-    """Return the first of some colours ``(name, percent)`` where it leads; None where it does not."""
+    """Return the first of the colours ``(name, percent)`` if it leads; else None."""
     if not found:
         return None
     (name, percent), next_percent = found[0], max((percent for _, percent in found[1:]), default=0)
@@ -35,10 +35,10 @@ def leading(found: Sequence[tuple[str, float]]) -> str | None:
 
 
 def shows_color(color: str, twin: Twin, caster: RayCaster, pose: np.ndarray, camera: Camera, mask: np.ndarray) -> bool:
-    """Whether a colour word also leads on what a picture shows of a twin.
+    """Return whether a colour word also leads on the visible surface of a twin.
 
-    ``mask (H, W) bool`` are its visible pixels, ``pose (4, 4)`` is where it stands; base colours are read where rays through
-    some of the pixels meet its visual surface.
+    ``mask (H, W) bool`` are its visible pixels and ``pose (4, 4)`` is its pose. Base colours are sampled where rays through
+    some of the pixels hit its visual surface.
     """
     rows, columns = np.nonzero(mask)
     chosen = np.unique(np.linspace(0, len(rows) - 1, _MOST_PX).astype(int))
@@ -54,7 +54,7 @@ def shows_color(color: str, twin: Twin, caster: RayCaster, pose: np.ndarray, cam
 
 
 def _colors(twin: Twin, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the base colours ``(N, 3)`` at faces of the parts as one mesh."""
+    """Return the base colours ``(N, 3)`` at points on faces, which are indices into the concatenated visual parts."""
     found = np.zeros((len(faces), 3))
     begin = 0
     for part in twin.visual:

@@ -1,4 +1,4 @@
-"""Which of the drafts are asked: answers balanced over the whole set by what the words alone would tell, so many a scene."""
+"""Selection of drafts: answers are balanced over the whole set against prediction from words, and limited for each scene."""
 
 from __future__ import annotations
 
@@ -12,30 +12,31 @@ from manitwin.scenes.vqa.question import CHOICE, NUMBER, YES_NO, Draft
 from manitwin.scenes.vqa.templates import FAMILIES
 
 MOST_OF_ONE_ANSWER = 0.52
-"""Share of the commoner answer of a yes/no family, at most."""
+"""Maximal share of the commoner answer of a yes/no family."""
 NUMBER_STEP_CM = 5
 MOST_OF_A_FAMILY = 0.09
-"""Share of a scene's questions that are of one family, at most, where others have enough."""
+"""Maximal share of one family in a scene's questions, if others have enough."""
 FIXED_CHOICES = frozenset(
     {"best_grasp_type", "region_of_object", "blocked_direction", "side_for_robot", "side_in_picture"}
 )
-"""Families that offer the same options each time."""
+"""Families with the same options in each question."""
 IN_ORDER = frozenset({"count_objects", "taller", "heavier", "side_for_robot", "side_in_picture"})
-"""Families whose options stand in an order of their own."""
+"""Families whose options have a fixed order."""
 LEAST_RIGHT = 0.1
-"""Share of such a family's questions that an option must be the answer of."""
+"""Least share of a family's questions, with the same options, that an option must answer."""
 MOST_ROUNDS, TOLD_MORE, LEAST_TOLD = 10, 0.01, 200
-"""Choices are balanced again, at most so often, while the likeliest options are right more often than chance by this; what fewer
-questions seem to tell is chance."""
+"""Choices are balanced at most ``MOST_ROUNDS`` times, while the likeliest options beat chance by more than ``TOLD_MORE``. With
+fewer than ``LEAST_TOLD`` drafts an excess counts as chance.
+"""
 SPLITS, MOST_ASKED = 4, 4000
 _KEPT_SURE = 0.7
-"""A choice is kept with this by (chance / probability of its answer): what words tell half as well as chance is always kept."""
+"""In the first round a choice is kept with this times (chance / probability of its answer by words), at most 1."""
 
 
 def words_of(draft: Draft, option: str = "") -> list[str]:
-    """Return what a reader of the words alone sees of a draft, and of one of its options, as features.
+    """Return the features that a text-only reader sees of a draft, and of one of its options.
 
-    Of a place that is one of several in random order nothing is seen.
+    An option that is a place in random order has no features.
     """
     if option.startswith("<") and draft.family not in IN_ORDER:
         return []
@@ -45,11 +46,11 @@ def words_of(draft: Draft, option: str = "") -> list[str]:
 
 
 def chosen(drafts: Sequence[Sequence[Draft]], per_scene: int, rng: random.Random) -> list[list[Draft]]:
-    """Return of each scene's drafts those that are asked, at most ``per_scene``.
+    """Return the selected drafts of each scene, at most ``per_scene``.
 
-    In each closed family an answer is kept with a probability inverse to the one that words alone give it (a logistic regression
-    fitted to all drafts), so that words tell nothing of the answers that stay. The balance is that of the whole set: balance
-    within a scene would let one guess an answer from the others.
+    In each closed family a draft is kept with a probability inverse to that of its answer given the words alone (a logistic
+    regression fitted to all drafts), so that words do not predict the remaining answers. The balance holds for the whole set:
+    balance within a scene would let a reader infer an answer from the others.
     """
     pool: dict[str, list[tuple[int, Draft]]] = defaultdict(list)
     for scene, of_scene in enumerate(drafts):
@@ -90,7 +91,7 @@ def _balanced_yes_no(found: list[tuple[int, Draft]], rng: random.Random) -> list
 
 
 def _balanced_choices(found: list[tuple[int, Draft]], rng: random.Random) -> list[tuple[int, Draft]]:
-    """Keep answers with a probability inverse to the one that words give them, again and again while many questions tell much."""
+    """Keep drafts with a probability inverse to that of their answer by words, repeatedly while words predict many answers."""
     for number in range(MOST_ROUNDS):
         sure = _KEPT_SURE if number == 0 else 1.0
         model = _option_model(found)
@@ -105,21 +106,21 @@ def _balanced_choices(found: list[tuple[int, Draft]], rng: random.Random) -> lis
 
 
 def _option_model(found: Sequence[tuple[int, Draft]]) -> WordModel:
-    """Fit what the words of an option tell of whether it is the answer."""
+    """Fit a model that predicts from the words of an option whether it is the answer."""
     pairs = [(draft, option) for _, draft in found for option in draft.options]
     return WordModel.fitted([words_of(*pair) for pair in pairs], [option == draft.answer for draft, option in pairs])
 
 
 def _told(model: WordModel, draft: Draft) -> dict[str, float]:
-    """Return the probability of each option by its words."""
+    """Return the probability of each option from its words, normalized over the options."""
     odds = {option: _odds(model.probability(words_of(draft, option))) for option in draft.options}
     return {option: value / sum(odds.values()) for option, value in odds.items()}
 
 
 def _told_beyond_chance(found: Sequence[tuple[int, Draft]]) -> float:
-    """Return by how much the likeliest options are right more often than chance, each half of the scenes by the other's words.
+    """Return the excess accuracy over chance of the likeliest options, with two-fold cross-validation over the scenes.
 
-    The mean over some ways to halve them, of at most ``MOST_ASKED`` drafts.
+    This is the mean over ``SPLITS`` ways to halve the scenes, with at most ``MOST_ASKED`` drafts.
     """
     found = found[:: -(-len(found) // MOST_ASKED)]
     gained = asked = 0.0
@@ -137,7 +138,7 @@ def _told_beyond_chance(found: Sequence[tuple[int, Draft]]) -> float:
 
 
 def _equalized(found: list[tuple[int, Draft]], rng: random.Random) -> list[tuple[int, Draft]]:
-    """Keep as many of each answer, by the options that there are; options that are hardly ever right are not offered."""
+    """Keep equally many drafts of each answer for each set of options, and remove options that are rarely right."""
     groups: dict[frozenset[str], list[tuple[int, Draft]]] = defaultdict(list)
     for each in found:
         groups[frozenset(each[1].options)].append(each)
@@ -161,7 +162,7 @@ def _odds(probability: float) -> float:
 
 
 def _balanced_numbers(found: list[tuple[int, Draft]], rng: random.Random) -> list[tuple[int, Draft]]:
-    """Keep of each step of the numbers at most twice as many as of the rarest third."""
+    """Keep in each bin of numbers at most twice the count of the bin at the first tertile."""
     steps: dict[int, list[tuple[int, Draft]]] = defaultdict(list)
     for each in found:
         steps[int(float(each[1].answer.split()[0]) // NUMBER_STEP_CM)].append(each)
@@ -173,11 +174,10 @@ def _balanced_numbers(found: list[tuple[int, Draft]], rng: random.Random) -> lis
 def _round_robin(
     families: dict[str, list[Draft]], per_scene: int, rng: random.Random
 ) -> tuple[list[Draft], list[Draft]]:
-    """Take from the categories in turn, and in each from the family that has been taken from least.
+    """Take drafts from the categories in turn, and in each from the family with the fewest taken drafts.
 
-    So a family of which a scene has few questions comes before more of the common ones. Returns those taken, and what may
-    fill gaps.
-    Yes/no questions fill none: which of them are asked was balanced over the whole set.
+    So families with few questions in a scene precede more questions of common families. Returns the taken drafts, and those
+    that may fill gaps; these contain no yes/no questions, whose selection was balanced over the whole set.
     """
     most = max(1, round(MOST_OF_A_FAMILY * per_scene))
     by_category: dict[str, list[list[Draft]]] = defaultdict(list)
@@ -201,7 +201,7 @@ def _round_robin(
 
 
 def _trimmed(scenes: list[list[Draft]], rng: random.Random) -> list[list[Draft]]:
-    """Drop questions of yes/no families until no answer has too large a share; a family of one answer goes."""
+    """Drop questions of yes/no families until no answer exceeds its maximal share; a family with one answer is dropped."""
     families = sorted({draft.family for of_scene in scenes for draft in of_scene if draft.kind == YES_NO})
     dropped: set[int] = set()
     for family in families:

@@ -1,4 +1,4 @@
-"""What an object meets when it is slid level, without turning: convex hulls swept along the way."""
+"""Collisions of an object that is slid horizontally without rotation, by swept convex hulls."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from manitwin.scenes.vqa.things import Thing
 TOUCH_M = 0.0005
 """Two bodies nearer than this touch."""
 DEEP_M = 0.002
-"""How deep one body must have come into the other, soon after they touched."""
+"""Least penetration depth, shortly after contact, that counts as a hit."""
 MARGIN_M = 0.020
-"""What misses by less, or is met in less before the end of the way, is not asked: the eye does not tell it from a hit."""
+"""Near misses, and hits this close to the end of the way, are not asked about, since a reader cannot tell them apart."""
 FURTHER_M = 0.010
-"""How much farther than where they touch the depth of a hit is measured."""
+"""Distance beyond the contact at which the depth of a hit is measured."""
 LEVEL_M = 0.010
-"""How far from a piece of furniture's top the foot of what stands on it is, at most."""
+"""Maximal height difference between the top of a piece of furniture and the foot of an object that stands on it."""
 LONGEST_M = 0.20
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """Where along a way (m) an object comes within the margin of another, and where it touches it; infinite: nowhere."""
+    """The distances (m) at which an object comes within the margin of another, and touches it; infinite for never."""
 
     near_m: float
     touch_m: float
@@ -36,13 +36,13 @@ class Meeting:
 
 @dataclass(frozen=True)
 class Way:
-    """All meetings along a straight way, by the other's name; ``leaves_m`` is where the object's middle leaves its support."""
+    """All meetings along a straight way, by obstacle name; ``leaves_m`` is where the object's centre leaves its support."""
 
     meetings: Mapping[str, Meeting]
     leaves_m: float
 
     def first_hit(self, length_m: float) -> tuple[str, float] | None:
-        """Return what is hit first and where; None where nothing surely is, or something else may be grazed before."""
+        """Return the name and distance of the first hit; None if no hit is certain, or another obstacle may be grazed before."""
         hits = sorted((meeting.touch_m, name) for name, meeting in self.meetings.items())
         if not hits or hits[0][0] > length_m - MARGIN_M:
             return None
@@ -52,28 +52,28 @@ class Way:
         return hits[0][1], hits[0][0]
 
     def order_is_sure(self) -> bool:
-        """Whether what is met first is met clearly before the next."""
+        """Return whether the first contact clearly precedes the second."""
         touches = sorted(meeting.touch_m for meeting in self.meetings.values())
         return len(touches) < 2 or touches[1] - touches[0] > MARGIN_M
 
     def is_free(self, length_m: float) -> bool:
-        """Whether nothing comes within the margin."""
+        """Return whether no obstacle comes within the margin."""
         return all(meeting.near_m > length_m for meeting in self.meetings.values())
 
     def verdict(self, length_m: float) -> bool | None:
-        """Tell whether something is hit on the first ``length_m``; None where that is a matter of millimetres."""
+        """Return whether the first ``length_m`` of the way contain a hit; None if that is uncertain."""
         if self.first_hit(length_m) is not None:
             return True
         return False if self.is_free(length_m) else None
 
 
 def can_be_slid(thing: Thing, record: SceneRecord) -> bool:
-    """Whether it stands on the furniture with nothing on or in it: sliding moves it alone."""
+    """Return whether an object stands on the furniture with nothing on or in it, so that it can be slid alone."""
     return thing.placed_as.supported_by is None and all(each.supported_by != thing.name for each in record.objects)
 
 
 def obstacles_of(thing: Thing, things: Sequence[Thing], record: SceneRecord) -> dict[str, PlacedParts]:
-    """Return by name what an object may run into: the other objects, and furniture that rises above its foot."""
+    """Return the possible obstacles of an object by name: the other objects, and furniture that rises above its foot."""
     foot = thing.placed.bounds[0][2]
     found = {other.name: other.placed for other in things if other is not thing}
     for box in furniture_boxes(record.furniture):
@@ -84,7 +84,7 @@ def obstacles_of(thing: Thing, things: Sequence[Thing], record: SceneRecord) -> 
 
 @dataclass(frozen=True)
 class Slide:
-    """An object that is slid level from its place moved by ``start_m (x, y)``, along a unit direction; nothing else moves."""
+    """A horizontal slide of an object along a unit direction, from its place moved by ``start_m (x, y)``; nothing else moves."""
 
     thing: Thing
     start_m: tuple[float, float]
@@ -97,17 +97,17 @@ class Slide:
 
     @property
     def moved(self) -> np.ndarray:
-        """How far from its place it starts ``(3,)``, m."""
+        """The offset ``(3,)`` of the start from the object's place, m."""
         return np.array([*self.start_m, 0.0])
 
 
 def sweep(
     slides: Sequence[Slide], things: Sequence[Thing], record: SceneRecord, length_m: float = LONGEST_M
 ) -> list[Way]:
-    """Return what each slide meets on its way among all the scene's ``things``.
+    """Return what each slide meets among all ``things`` of the scene.
 
-    Convex parts against those of the others that the box of their way meets, by ray casts against their difference, the
-    nearest first; those of all slides at once.
+    Convex parts are tested against those of obstacles whose boxes meet the swept box, by ray casts against their Minkowski
+    difference, nearest first; all slides are processed at once.
     """
     obstacles = {each.thing.name: obstacles_of(each.thing, things, record) for each in slides}
     groups = [
@@ -126,9 +126,9 @@ def sweep(
 
 @dataclass(frozen=True)
 class _Pairs:
-    """Pairs of a moving part ``(P, A, 3)`` and another's ``(P, B, 3)``, whose boxes meet when the first goes along ``unit (3,)``.
+    """Pairs of moving parts ``(P, A, 3)`` and others ``(P, B, 3)`` whose boxes meet when the first move along ``unit (3,)``.
 
-    ``gap_m (P,)`` is how far the box around the first and its margin goes until they do.
+    ``gap_m (P,)`` is the distance that the box around the moving part and its margin moves until they meet.
     """
 
     moving: np.ndarray
@@ -138,7 +138,7 @@ class _Pairs:
 
 
 def _on_the_way(slide: Slide, obstacles: Mapping[str, PlacedParts], length_m: float) -> Iterator[tuple[str, _Pairs]]:
-    """Return by obstacle the pairs of parts that may come within the margin, by boxes along the way and across."""
+    """Yield by obstacle the pairs of parts that may come within the margin, from boxes aligned with the direction."""
     parts = slide.thing.placed.parts + slide.moved
     way = slide.unit * length_m
     swept_low = np.minimum(parts.min((0, 1)), (parts + way).min((0, 1))) - MARGIN_M
@@ -160,7 +160,7 @@ def _on_the_way(slide: Slide, obstacles: Mapping[str, PlacedParts], length_m: fl
 
 
 def _meetings(groups: Sequence[_Pairs], length_m: float) -> list[Meeting]:
-    """Return of each group of pairs where the first comes within the margin, and where the first touches."""
+    """Return for each group of pairs the first distance within the margin, and the first contact."""
     if not groups:
         return []
     first, second = _padded([each.moving for each in groups]), _padded([each.others for each in groups])
@@ -173,7 +173,7 @@ def _meetings(groups: Sequence[_Pairs], length_m: float) -> list[Meeting]:
 
 
 def _is_deep(slide: Slide, obstacle: PlacedParts, met: Meeting) -> bool:
-    """Whether an object is well inside of another soon after they touch: what only grazes is not sure to be hit."""
+    """Return whether an object penetrates an obstacle deeply shortly after contact; otherwise it may only graze it."""
     if not np.isfinite(met.touch_m):
         return False
     pose = slide.thing.pose.copy()
@@ -182,7 +182,7 @@ def _is_deep(slide: Slide, obstacle: PlacedParts, met: Meeting) -> bool:
 
 
 def _padded(groups: Sequence[np.ndarray]) -> np.ndarray:
-    """Put parts ``(P, A, 3)`` behind each other, the first corner of each repeated until all have as many."""
+    """Concatenate parts ``(P, A, 3)``, padded to the same number of corners by repeating the first corner."""
     most = max(parts.shape[1] for parts in groups)
     return np.concatenate(
         [np.concatenate([parts, np.repeat(parts[:, :1], most - parts.shape[1], axis=1)], axis=1) for parts in groups]
@@ -190,7 +190,7 @@ def _padded(groups: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _leaves(slide: Slide, record: SceneRecord) -> float:
-    """Return how far the middle of an object's foot goes before the furniture below it ends."""
+    """Return how far the centre of an object moves before the furniture below it ends."""
     middle = (slide.thing.center_m + slide.moved)[:2]
     foot = slide.thing.placed.bounds[0][2]
     unit = slide.unit

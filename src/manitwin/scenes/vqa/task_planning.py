@@ -1,4 +1,4 @@
-"""Questions of task planning: what an object meets when it is slid, and which of two objects is heavier."""
+"""Task planning questions: what an object hits when it is slid, and which of two objects is heavier."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from manitwin.scenes.vqa.sweeps import LONGEST_M, Slide, Way
 from manitwin.scenes.vqa.things import Seen
 
 LENGTHS_CM = (5, 10, 15)
-"""Of the straight slides that are asked about."""
+"""The lengths of the straight slides."""
 LEGS_CM = (5, 10)
-"""Of each leg of a slide of two legs."""
+"""The lengths of each leg of a slide of two legs."""
 MOST_OPTIONS = 4
-"""Answers that a question offers at most, the right one among them."""
+"""Maximal number of options of a question, including the right one."""
 
 
 def task_planning(asked: Context) -> Iterator[Draft]:
@@ -39,7 +39,7 @@ def task_planning(asked: Context) -> Iterator[Draft]:
 
 
 def _stays(asked: Context, seen: Seen, direction: Direction, way: Way, cm: int) -> bool:
-    """Tell whether the object stays on its support and in the picture all the way."""
+    """Return whether the object stays on its support and in the picture all the way."""
     length_m = cm / 100
     return length_m <= min(way.leaves_m, LONGEST_M) and asked.in_view(seen, np.array(direction.vector) * length_m)
 
@@ -112,7 +112,7 @@ def _blocked(asked: Context, seen: Seen, directions: list[Direction], ways: list
 
 @dataclass(frozen=True)
 class _Legs:
-    """A slide of two legs, each a direction and a length; ``hit`` is what the first leg meets and after how many m, or None."""
+    """A slide of two legs, each a direction and a length; ``hit`` is name and distance (m) of the first leg's hit, or None."""
 
     seen: Seen
     first: Direction
@@ -123,15 +123,16 @@ class _Legs:
 
     @property
     def corner_m(self) -> tuple[float, float]:
-        """Where the second leg begins, in x and y from the place of the object."""
+        """The start of the second leg, in x and y from the object's place."""
         x, y = self.first.vector
         return x * self.first_cm / 100, y * self.first_cm / 100
 
 
 def _first_legs(asked: Context, seen: Seen, directions: list[Direction], ways: list[Way]) -> Iterator[_Legs]:
-    """Yield up to two slides of two legs with directions drawn at random, one across the other.
+    """Yield up to two slides of two legs with random directions, roughly perpendicular to each other.
 
-    None whose first leg leaves the support or the picture, or passes something so closely that nobody could tell from a hit.
+    Slides are skipped if the first leg leaves the support or the picture, or passes an object so closely that a hit is
+    uncertain.
     """
     pairs = [(a, b) for a, b in permutations(range(len(directions)), 2)
              if abs(np.dot(directions[a].vector, directions[b].vector)) < 0.5]  # fmt: skip
@@ -181,7 +182,7 @@ def _two_legs_draft(asked: Context, legs: _Legs, hit: tuple[str, float] | None, 
 
 
 def _weights(asked: Context) -> Iterator[Draft]:
-    """Yield comparisons of two objects that a point can mean, where the intervals of their masses do not overlap."""
+    """Yield comparisons of two pointed objects whose mass intervals do not overlap."""
     for (a, p), (b, q) in permutations(asked.pointed, 2):
         of_a, of_b = (each.thing.shape.twin.physical.mass_kg for each in (a, b))
         if of_a.low <= of_b.high and of_b.low <= of_a.high:

@@ -1,4 +1,4 @@
-"""The words of the questions: of each family its category, its kind of answer and its paraphrases, the last one held out."""
+"""Templates of the questions: the category and paraphrases of each family; the last paraphrase is held out."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manitwin.scenes.vqa.question import DETECTION, FUNCTION, LANGUAGE, SCENE, T
 
 @dataclass(frozen=True)
 class Family:
-    """A kind of question; of ``paraphrases`` the last is asked in the split ``val`` only."""
+    """A kind of question; only the split ``val`` uses the last of its ``paraphrases``."""
 
     category: str
     paraphrases: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""A scene's objects as questions need them: words, hulls where they stand, and what each picture shows of them."""
+"""Objects of a scene as questions need them: words, hulls at their poses, and their view in each picture."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import Part
 
 NAMED_SHARE, NAMED_PX = 0.40, 150
-"""What is seen less of is not asked about; pixels are those of a picture of 512 x 512."""
+"""Least visible share and pixels of an object in a question; pixels are those of a picture of 512 x 512."""
 HIDDEN_PX = 20
-"""What is seen less of is not in the picture; between the two an object is doubtful."""
+"""An object with at most this many visible pixels is not in the picture; one between the two limits is doubtful."""
 REFERENCE_PX = 512
 
 _SHARE = re.compile(r"^(?P<word>[a-z ]+?)(?: \((?P<percent>\d+) %\))?$")
@@ -39,7 +39,7 @@ _SHARE = re.compile(r"^(?P<word>[a-z ]+?)(?: \((?P<percent>\d+) %\))?$")
 
 @dataclass(frozen=True)
 class Shape:
-    """A twin's surface for rays and its hulls, object frame; one for all of its scenes."""
+    """A twin's surface for ray casts and its hulls, in the object frame; shared by all scenes."""
 
     twin: Twin
     hulls: ConvexParts
@@ -52,17 +52,17 @@ class Shape:
 
     @cached_property
     def caster(self) -> RayCaster:
-        """Rays at the whole visual surface."""
+        """The ray caster of the whole visual surface."""
         return RayCaster(merged(self.twin.visual))
 
     @cached_property
     def longest_m(self) -> float:
-        """The distance of the two points that are farthest apart."""
+        """The diameter: the distance (m) of its two farthest points."""
         return float(pdist(self.hulls.whole).max())
 
     @cached_property
     def part_casters(self) -> dict[str, tuple[RayCaster, np.ndarray]]:
-        """Rays at each part alone, and its corners ``(V, 3)``, by the part's id."""
+        """The ray caster of each part alone and its triangle corners ``(V, 3)``, by part id."""
         mesh, labels = merged(self.twin.visual), self.twin.face_parts()
         found = {}
         for place, part in enumerate(self.twin.record.parts):
@@ -73,7 +73,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Thing:
-    """An object where it stands: ``number`` is its id in pictures, ``color`` a sure colour word or None."""
+    """An object at its pose: ``number`` is its id in pictures, ``color`` a certain colour word or None."""
 
     placed_as: SceneObject
     number: int
@@ -83,7 +83,7 @@ class Thing:
 
     @property
     def name(self) -> str:
-        """Its name in the scene."""
+        """The name in the scene."""
         return self.placed_as.name
 
     @property
@@ -93,34 +93,34 @@ class Thing:
 
     @property
     def head(self) -> str:
-        """The noun of the category: ``bottle`` of ``ketchup bottle``."""
+        """The noun of the category: ``bottle`` for ``ketchup bottle``."""
         return noun_of(self.category)
 
     @property
     def parts(self) -> list[Part]:
-        """The twin's parts."""
+        """The parts of the twin."""
         return self.shape.twin.record.parts
 
     @cached_property
     def placed(self) -> PlacedParts:
-        """Its hulls at its pose in the world."""
+        """The hulls at the object's pose in the world."""
         return self.shape.hulls.at(self.pose)
 
     @cached_property
     def center_m(self) -> np.ndarray:
-        """The middle of its box in the world ``(3,)``."""
+        """The centre of its bounding box in the world ``(3,)``."""
         low, high = self.placed.bounds
         return np.asarray((low + high) / 2)
 
     @property
     def longest_m(self) -> float:
-        """The distance (m) of its two points that are farthest apart."""
+        """The distance (m) of its two farthest points."""
         return self.shape.longest_m
 
 
 @dataclass(frozen=True)
 class Seen:
-    """What a picture shows of an object: ``mask (H, W) bool`` of its visible pixels."""
+    """The view of an object in a picture."""
 
     thing: Thing
     view: ObjectView
@@ -128,28 +128,28 @@ class Seen:
 
     @cached_property
     def mask(self) -> np.ndarray:
-        """Its visible pixels ``(H, W) bool``."""
+        """The visible pixels ``(H, W) bool``."""
         return self.picture.ids == self.thing.number
 
     @cached_property
     def column(self) -> float:
-        """The mean column of its visible pixels."""
+        """The mean column of the visible pixels."""
         return float(np.nonzero(self.mask)[1].mean() + 0.5)
 
     @cached_property
     def columns(self) -> tuple[float, float]:
-        """The first and the last column of its visible pixels."""
+        """The first and the last column of the visible pixels."""
         columns = np.flatnonzero(self.mask.any(0))
         return float(columns[0]), float(columns[-1])
 
     @cached_property
     def inner(self) -> tuple[Point, float]:
-        """The point of the picture deepest inside of its visible pixels, and how deep (px)."""
+        """The point of the picture deepest inside the visible pixels, and its depth (px)."""
         return inner_point(self.mask)
 
     @cached_property
     def color(self) -> str | None:
-        """The object's colour word, where it also leads on what the picture shows; else None."""
+        """The object's colour word if it also leads on the visible surface; else None."""
         shape, camera = self.thing.shape, self.picture.camera
         color = self.thing.color
         if color is None or not self.mask.any():
@@ -158,23 +158,23 @@ class Seen:
 
     @property
     def scale(self) -> float:
-        """Pixels of this picture by those of one of 512 x 512, in area."""
+        """The ratio of this picture's area to that of one of 512 x 512 pixels."""
         return self.picture.camera.width_px * self.picture.camera.height_px / REFERENCE_PX**2
 
     @property
     def is_clear(self) -> bool:
-        """Whether a question may name it."""
+        """Whether a question may name the object."""
         return self.view.visible_share >= NAMED_SHARE and self.view.visible_px >= NAMED_PX * self.scale
 
     @property
     def is_hidden(self) -> bool:
-        """Whether the picture does not show it."""
+        """Whether the picture does not show the object."""
         return self.view.visible_px <= HIDDEN_PX * self.scale
 
 
 @dataclass(frozen=True)
 class View:
-    """A picture with what it shows of all objects."""
+    """A picture with its views of all objects."""
 
     picture: PictureTruth
     seen: tuple[Seen, ...]
@@ -196,20 +196,20 @@ class View:
 
     @cached_property
     def is_sure(self) -> bool:
-        """Whether each object is either clear or not in the picture: what counts and lists may be asked of."""
+        """Whether each object is either clear or not in the picture, which counts and lists require."""
         return all(each.is_clear or each.is_hidden for each in self.seen)
 
     @cached_property
     def shows_all(self) -> bool:
-        """Whether every object of the scene is clear: what could be run into is seen."""
+        """Whether every object of the scene is clear, so that all possible obstacles are visible."""
         return all(each.is_clear for each in self.seen)
 
     def of(self, name: str) -> Seen:
-        """Return what it shows of an object."""
+        """Return the view of an object."""
         return next(each for each in self.seen if each.thing.name == name)
 
     def pixel(self, point_m: np.ndarray) -> tuple[float, float, float]:
-        """Return column, row and depth (m) of a world point."""
+        """Return the column, row and depth (m) of a world point."""
         pixels, depth_m = project(np.asarray(point_m, float)[None], self.camera)
         return float(pixels[0, 0]), float(pixels[0, 1]), float(depth_m[0])
 
@@ -224,7 +224,7 @@ def things_of(scene: SceneTruth, shape_of: Callable[[str], Shape]) -> list[Thing
 
 
 def views_of(scene: SceneTruth, things: list[Thing]) -> list[View]:
-    """Return the pictures of a scene with what each shows."""
+    """Return the pictures of a scene with their views of all objects."""
     return [
         View(picture, tuple(Seen(thing, picture.views[thing.name], picture) for thing in things))
         for picture in scene.pictures
@@ -232,7 +232,7 @@ def views_of(scene: SceneTruth, things: list[Thing]) -> list[View]:
 
 
 def sure_color(twin: Twin) -> str | None:
-    """Return the one colour word of a twin, such as ``dark green``; None where it has none that leads."""
+    """Return the leading colour word of a twin, such as ``dark green``; None if there is none."""
     if twin.record.language is None:
         return None
     found: list[tuple[str, float]] = []
@@ -245,9 +245,9 @@ def sure_color(twin: Twin) -> str | None:
 
 
 def inner_point(mask: np.ndarray) -> tuple[Point, float]:
-    """Return the pixel's centre deepest inside of a mask ``(H, W) bool``, in shares of its size, and how deep (px).
+    """Return the pixel centre deepest inside a mask ``(H, W) bool``, in shares of its size, and its depth (px).
 
-    Beyond the picture's frame nothing is known: its border counts as the mask's.
+    The border of the picture counts as a border of the mask, since nothing is known beyond it.
     """
     padded = np.pad(mask.astype(np.uint8), 1)
     depth = cv2.distanceTransform(padded, cv2.DIST_L2, 3)[1:-1, 1:-1]
@@ -257,7 +257,7 @@ def inner_point(mask: np.ndarray) -> tuple[Point, float]:
 
 
 def part_alone_px(thing: Thing, part: Part, camera: Camera, step_px: int = 2) -> float:
-    """Return about how many pixels a part alone would cover, by rays on every other pixel of the frame."""
+    """Return approximately how many pixels a part alone would cover, by ray casts at every ``step_px``-th pixel."""
     caster, corners = thing.shape.part_casters[part.id]
     pixels, depth_m = project(transform_points(thing.pose, corners), camera)
     if not (depth_m > 0).all():

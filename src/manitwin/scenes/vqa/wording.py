@@ -1,4 +1,4 @@
-"""How points, boxes and choices are written: the conventions of models that answer with places."""
+"""Notation of points, boxes and choices: the conventions of models that answer with places."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manitwin.scenes.vqa.question import BOX, CHOICE, POINT, YES_NO, Box, Point,
 
 @dataclass(frozen=True)
 class Convention:
-    """How places are written; ``ask_point`` and ``ask_box`` are said behind a question that wants one."""
+    """A notation of places; ``ask_point`` and ``ask_box`` follow a question that asks for one."""
 
     point: Callable[[Point, int, int], str]
     box: Callable[[Box, int, int], str]
@@ -69,12 +69,12 @@ CONVENTIONS: Mapping[str, Convention] = {
         f"Answer with (left, top, right, bottom) in thousandths {_SHARES}.",
     ),
 }  # fmt: skip
-"""By name; RoboPoint's and RoboRefer's write what their evaluations read."""
+"""The conventions by name; those of RoboPoint and RoboRefer give what their evaluations read."""
 
 
 @dataclass(frozen=True)
 class Worded:
-    """A question as it is shown: ``prompt`` with options and how to answer, ``answer`` short, ``response`` a sentence."""
+    """A worded question: ``prompt`` with options and answer format, ``answer`` short, ``response`` a sentence."""
 
     question: str
     prompt: str
@@ -88,7 +88,7 @@ def worded(question: Question, convention: str, width_px: int, height_px: int) -
     rules = CONVENTIONS[convention]
 
     def written(text: str) -> str:
-        # a place in a sentence is a plain pair; a list of tuples is what an answer is
+        # a place in a sentence is a plain pair; only an answer is a list of tuples
         place = rules.point if question.kind == POINT else CONVENTIONS[_PLAIN.get(convention, convention)].point
         for number, point in enumerate(question.points):
             text = text.replace(f"<p{number}>", place(point, width_px, height_px))

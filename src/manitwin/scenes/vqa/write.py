@@ -1,4 +1,4 @@
-"""A data set of questions about drawn scenes, in one format, with its page."""
+"""Data sets of questions about rendered scenes, in one format, with their report page."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ def ask_scenes(
     seed: int = 7,
     wordings_for: Callable[[Sequence[str]], Mapping[str, Sequence[str]]] = lambda families: {},
 ) -> tuple[list[Question], dict[str, PictureTruth]]:
-    """Return the questions about drawn scenes, and their pictures by name; raises UsageError, TwinError.
+    """Return the questions about rendered scenes, and their pictures by name; raises UsageError, TwinError.
 
-    ``wordings_for`` returns further wordings of families.
+    ``wordings_for`` returns more wordings of families.
     """
     source = TwinSource(dataset if dataset is not None else dataset_of(files[0]))
     shapes: dict[str, Shape] = {}
@@ -75,7 +75,7 @@ def ask_scenes(
         scene = read_scene_truth(file)
         ids.append(scene.record.scene_id)
         drafts.append(drafts_of(scene, shape_of, categories, seed))
-        # copies without what was read of them: a thousand scenes' labels do not fit into memory
+        # copies without cached arrays: the labels of a thousand scenes do not fit into memory
         pictures |= {f"{scene.record.scene_id}_{each.name}.jpg": replace(each) for each in scene.pictures}
     questions = questions_of(
         ids, drafts, per_scene=per_scene, validation_share=validation_share, seed=seed, wordings_for=wordings_for
@@ -95,13 +95,13 @@ def write_vqa(
     seed: int = 7,
     vlm: str = NO_CHAT,
 ) -> Asked:
-    """Write questions about drawn scenes with computed answers, whole or not at all.
+    """Write questions about rendered scenes with computed answers, atomically.
 
-    ``scenes`` is what ``manitwin layout --pictures`` wrote, or one scene of it; ``dataset`` is where its twins are, by default
-    where it says. ``points`` is the convention of places. ``questions.jsonl`` holds the questions with their evidence,
-    ``report.html`` samples and balance; the rest is of the format. ``vlm`` is a model that words the questions of the split
-    ``train`` in other ways too (``openai:MODEL@URL``); what it gave is in ``rephrasings.json``. Raises UsageError for an
-    unknown format or convention, scenes that were not drawn or give no question, or an ``out`` that is not empty.
+    ``scenes`` is the output of ``manitwin layout --pictures``, or one scene of it. ``dataset`` is the folder of its twins, by
+    default the one that the run names. ``points`` is the convention of places. ``questions.jsonl`` contains the questions with
+    their evidence, ``report.html`` samples and balance; the other files depend on the format. ``vlm`` is a model that rephrases
+    the questions of the split ``train`` (``openai:MODEL@URL``); its wordings are in ``rephrasings.json``. Raises UsageError for
+    an unknown format or convention, scenes without pictures or without any question, or an ``out`` that is not empty.
     """
     if form not in FORMATS:
         raise UsageError(choose_from("format", form, FORMATS))
