@@ -1,1 +1,1 @@
-"""Many twins: index, queries, statistics, publication."""
+"""Data sets of twins: build, index, query, search, statistics, evaluation, review and publication."""

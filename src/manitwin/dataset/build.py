@@ -1,4 +1,4 @@
-"""A build of twins, once what it was asked for is checked: the recipe of twins, and the index that is kept of them meanwhile."""
+"""Build the twins of a checked request: run the twin recipe over its items and keep the index up to date during the run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,12 @@ def build_requested(
     on_stage: OnStage = lambda event: None,
     on_result: Callable[[ItemResult], None] = lambda result: None,
 ) -> BuildReport:
-    """Build the twins that were asked for; raises UsageError as ``build`` does for what only reading the inputs shows."""
+    """Build the twins of a checked request and return the report.
+
+    ``on_estimate`` receives the estimated service cost in US dollars per kind of service, ``on_start`` the number of items and of
+    opened ones. ``on_stage`` is called per stage event, ``on_result`` once per item that ends. Raises UsageError, as ``build``
+    does, for errors that only reading the inputs can reveal.
+    """
     settings, root = request.settings, request.root
     there: dict[int, bool] = {}
     log_choices(settings)

@@ -1,4 +1,7 @@
-"""Do the ledger and the folders agree? What differs is named, and put right from the folders, which are the truth."""
+"""Consistency check of a data set: compare the ledger, the index and the twin folders, and offer a repair per disagreement.
+
+The folders are the ground truth: repairs change the ledger and the index to match them, or have a damaged folder rebuilt.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +22,14 @@ from manitwin.twin.wholeness import damage, foreign_files
 
 INDEX = "index"
 _FOLDER = re.compile(r"[0-9A-Za-z_-][0-9A-Za-z_.-]*")
-"""What can be the name of a twin's folder, a stage's or a result's: a ledger may be altered."""
+"""Valid names of twin, stage and result folders. Names from the ledger are checked against it, since a ledger may be tampered
+with.
+"""
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """One thing that is not as it should be, and what puts it right (None: only a person can)."""
+    """One inconsistency and the function that repairs it; ``repair`` is None if it needs a manual decision."""
 
     what: str
     repair: Callable[[], None] | None
@@ -33,9 +38,9 @@ class Disagreement:
 def disagreements(
     ledger: Ledger, root: DatasetRoot, keeps_work: bool, *, digests: bool = False
 ) -> Iterator[Disagreement]:
-    """Yield all that differs between a ledger that nobody else writes and the folders below the root.
+    """Yield every difference between a ledger and the folders below the root. No other process may write to the ledger.
 
-    Files of finished twins are compared by their sizes, with ``digests`` by their bytes.
+    Files of finished twins are compared by size, with ``digests`` also by content. ``keeps_work`` also checks the stage results.
     """
     yield from _interrupted(ledger)
     yield from _ended_without_folder(ledger, root, digests)
@@ -85,7 +90,7 @@ def _ended_without_folder(ledger: Ledger, root: DatasetRoot, digests: bool) -> I
 
 
 def _read(root: DatasetRoot, twin_id: str) -> TwinRecord:
-    """Return a twin's record, held against its revision; raises FileNotFoundError and TwinError."""
+    """Return a twin's record after checking its revision; raises FileNotFoundError and TwinError."""
     name = f"{root.twin_name(twin_id)}/{RECORD}"
     record = parse_record(root.read_bytes(name), name, sealed=True)
     if record.twin_id != twin_id:
@@ -102,7 +107,7 @@ def _what_is_wrong(root: DatasetRoot, record: TwinRecord, state: str, revision: 
 
 
 def damaged_twins(root: DatasetRoot, *, digests: bool = False) -> Iterator[str]:
-    """Yield what is wrong with twins of a data set that has no ledger: one line a twin that is damaged, or a foreign file."""
+    """Yield one line per damaged twin, or twin with foreign files in its folder, of a data set that has no ledger."""
     for twin_id in root.twin_ids():
         folder = root.twin_name(twin_id)
         try:
@@ -124,7 +129,7 @@ def _folders_nobody_ended(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagre
             "SELECT number, state FROM items WHERE twin_id = ? AND state <> 'duplicate'", (twin_id,)
         ).fetchone()
         if row is None:
-            # an item that was never surveyed since the folder was made will find it by itself
+            # An item that has not been surveyed since the folder was made will find the folder by itself.
             (unknown,) = ledger.connection.execute("SELECT count(*) FROM items WHERE twin_id IS NULL").fetchone()
             if not unknown:
                 yield Disagreement(
@@ -148,10 +153,10 @@ def _half_folders(root: DatasetRoot) -> Iterator[Disagreement]:
 
 
 def _done_without_result(ledger: Ledger, root: DatasetRoot, digests: bool) -> Iterator[Disagreement]:
-    """Tell the results that are damaged or gone.
+    """Yield the stage results that are marked as done but are damaged or missing.
 
-    An item that has ended, and whose folder of results is gone as a whole, lacks nothing: a person may remove it for room,
-    and what is asked of the item later runs again.
+    If an item has ended and its whole folder of results is gone, nothing is reported: a user may delete it to free disk space,
+    and stages that are needed later run again.
     """
     rows = ledger.connection.execute(
         "SELECT s.number, i.twin_id, s.stage, s.key, i.state IN ('accepted', 'rejected', 'duplicate')"
@@ -175,7 +180,7 @@ def _done_without_result(ledger: Ledger, root: DatasetRoot, digests: bool) -> It
 
 
 def _index(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
-    from manitwin.dataset.index.parts import indexed_twins  # takes a second to import
+    from manitwin.dataset.index.parts import indexed_twins  # the import takes a second
 
     try:
         in_tables = indexed_twins(root)
@@ -213,13 +218,13 @@ def _is_result(root: DatasetRoot, name: str, digests: bool) -> bool:
 
 
 def _undo(ledger: Ledger, root: DatasetRoot, number: int, stage: str, name: str) -> None:
-    """Forget a stage's result, so that it runs again where the item is made again."""
+    """Delete a stage's result and its ledger row, so that the stage runs again when the item is rebuilt."""
     root.remove(name)
     _execute(ledger, "DELETE FROM stages WHERE number = ? AND stage = ?", [(number, stage)])
 
 
 def _reindex(ledger: Ledger, root: DatasetRoot) -> None:
-    """Write the index again from the folders that are whole; what is open again is added by the next build."""
+    """Rewrite the index from the intact folders. Reopened items are added by the next build."""
     _execute(ledger, "UPDATE items SET indexed = 0", [()])
     if next(root.twin_ids(), None) is None:
         root.remove(INDEX)
@@ -228,7 +233,7 @@ def _reindex(ledger: Ledger, root: DatasetRoot) -> None:
 
 
 def indexed_again(root: DatasetRoot) -> set[str]:
-    """Write the index again from the folders; returns the ids of the twins in it."""
+    """Rewrite the index from the folders and return the ids of the twins in it."""
     from manitwin.dataset.index.parts import indexed_twins
     from manitwin.dataset.index.rebuild import rebuild
 
@@ -238,7 +243,7 @@ def indexed_again(root: DatasetRoot) -> set[str]:
 
 
 def _redo(ledger: Ledger, root: DatasetRoot, number: int, twin_id: str) -> None:
-    """Have an item's folder put together again, from the results of its stages where they are still there."""
+    """Remove a twin's folder and reopen its item, so that it is assembled again, from existing stage results where possible."""
     root.remove(root.twin_name(twin_id))
     ledger.reopen([number])
 
@@ -253,7 +258,7 @@ def _execute(ledger: Ledger, statement: str, rows: list[tuple[object, ...]]) -> 
 
 
 def index_damage(root: DatasetRoot) -> str | None:
-    """Return what is wrong with the index of a data set without a ledger; None where nothing is, or where it has none."""
+    """Return what is wrong with the index of a data set without a ledger; None if it is intact or does not exist."""
     from manitwin.dataset.index.parts import indexed_twins
 
     if not root.exists(INDEX):

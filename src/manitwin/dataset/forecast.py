@@ -1,7 +1,7 @@
-"""What so many inputs would cost, from what a data set's own inputs cost: CPU time, service costs, twins and disk.
+"""Forecast CPU time, service costs, accepted twins and disk space for many inputs from the inputs already built in a data set.
 
-Inputs are taken as drawn from one population, those of the data set and those to come. An interval is that of a mean over the
-inputs by the percentile bootstrap (Efron 1979), of a share Wilson's (1927); what was not measured is None, never guessed.
+The built inputs and the future inputs are assumed to be draws from one population. Intervals (95 %) of means are percentile
+bootstrap intervals (Efron 1979), those of shares are Wilson intervals (1927). Quantities that were not measured are None.
 """
 
 from __future__ import annotations
@@ -18,36 +18,39 @@ from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.shares import wilson_interval
 
 LEAST_INPUTS = 5
-"""Of fewer, one that is out of the ordinary decides everything."""
+"""Minimum number of built inputs; with fewer, a single outlier dominates the forecast."""
 MOST_SIZED = 200
-"""Inputs whose folders are looked at for their size, drawn by the seed."""
+"""Number of inputs, drawn by the seed, whose folder sizes are measured."""
 RESAMPLES = 1000
 MOST_RESAMPLED = 5_000
-"""Inputs beyond which so many, drawn by the seed, stand for all in the interval: wider than it need be, never narrower."""
+"""Number of inputs above which a random subset of this size is bootstrapped; the interval is then wider than necessary, never
+narrower.
+"""
 LARGEST_MEMORY_GB = 1e6
 WORK = ".work"
 
 
 @dataclass(frozen=True)
 class Amount:
-    """A figure for all inputs to come, with its interval (95 %)."""
+    """A forecast quantity for all future inputs with its 95 % interval."""
 
     value: float
     low: float
     high: float
 
     def times(self, factor: float) -> Amount:
-        """Return the amount times a factor."""
+        """Return the amount and its interval multiplied by a factor."""
         return Amount(self.value * factor, self.low * factor, self.high * factor)
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """What ``items`` inputs would take; ``measured`` inputs are what it is told from.
+    """Resources that ``items`` inputs would take, estimated from ``measured`` inputs.
 
-    ``hours`` are those of ``cores`` that are always busy: no run is faster. ``usd`` is None without the price of a core's
-    hour. ``work_bytes`` are results of stages, which may be removed once all is done; None where none are kept.
-    ``memory_bytes`` is the limit of all workers together, not what they use, which is not recorded.
+    ``hours`` is the wall time on ``cores`` cores that are always busy, a lower bound for a real run. ``usd`` is None if the price
+    of a core hour is not given. ``work_bytes`` is the size of stage results, which can be deleted after the run; None if none are
+    kept. ``memory_bytes`` is the memory limit summed over all workers, since actual use is not recorded. ``stages`` maps each
+    stage to its share of the CPU time.
     """
 
     items: int
@@ -67,7 +70,7 @@ class Forecast:
     stages: dict[str, float]
 
     def document(self) -> dict[str, Any]:
-        """Return it as plain values."""
+        """Return the forecast as plain values for JSON."""
         plain = dict(vars(self))
         return {name: dict(vars(value)) if isinstance(value, Amount) else value for name, value in plain.items()}
 
@@ -75,7 +78,7 @@ class Forecast:
 def forecast(
     root: DatasetRoot, items: int, cores: int, *, core_hour_usd: float | None = None, seed: int = 0
 ) -> Forecast:
-    """Tell what ``items`` inputs would take on ``cores`` cores; raises UsageError where too little was measured."""
+    """Forecast the resources of ``items`` inputs on ``cores`` cores; raises UsageError if too little was measured."""
     index = Index(root)
     status = index.select("twins", columns=["twin_id"]).to_pydict()["twin_id"]
     rejected = index.select("rejections", columns=["twin_id"]).to_pydict()["twin_id"]
@@ -102,7 +105,7 @@ def forecast(
             f"{root.path}: it has no recorded CPU time of stages; run `manitwin index {root.path}` and try again"
         )
     rng = np.random.default_rng(seed)
-    busy = min(cores, items)  # an input is built on one core
+    busy = min(cores, items)  # one input uses one core
     cpu_hours = _for_all(cpu_s / 3600, items, rng)
     accepted = len(set(status) - set(rejected))
     low, high = wilson_interval(accepted, len(ids))
@@ -135,7 +138,7 @@ def _of(amount: Amount) -> tuple[float, float, float]:
 
 
 def _for_all(each: np.ndarray, items: int, rng: np.random.Generator) -> Amount:
-    """Return the sum over ``items`` inputs of which ``each`` (N,) are a sample, with the bootstrap's interval of the mean."""
+    """Return the sum over ``items`` inputs, given a sample ``each`` (N,) of them, with the bootstrap interval of the mean."""
     kept = each if len(each) <= MOST_RESAMPLED else rng.choice(each, MOST_RESAMPLED, replace=False)
     counts = rng.multinomial(len(kept), np.full(len(kept), 1 / len(kept)), size=RESAMPLES)
     low, high = np.percentile(counts @ kept / len(kept), [2.5, 97.5])
@@ -152,7 +155,7 @@ def _bytes_of(root: DatasetRoot, name: str) -> float:
 
 
 def _memory_bytes(root: DatasetRoot, cores: int) -> float | None:
-    """Return the memory limit of so many workers, by the data set's configuration; None where it is not told."""
+    """Return the summed memory limit of ``cores`` workers from the data set's configuration; None if it is not stated."""
     try:
         run = root.read_json("config.json").get("run")
     except (TwinError, FileNotFoundError):

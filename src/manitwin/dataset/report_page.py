@@ -1,4 +1,4 @@
-"""A page about a data set that was made: counts, tables and sample pictures in one HTML file, which needs no request."""
+"""Self-contained HTML report of a generated data set: counts, tables and sample pictures, without external requests."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ tbody > tr > * { vertical-align: top; }
 
 @dataclass(frozen=True)
 class Picture:
-    """A sample: a PNG and what it shows."""
+    """A sample picture (PNG bytes) with its caption."""
 
     png: bytes
     caption: str
@@ -32,7 +32,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of texts and numbers below headings; the first column names the row."""
+    """Rows of texts and numbers below column headings; the first column names the row."""
 
     caption: str
     headings: Sequence[str]
@@ -41,14 +41,14 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """A headed part of the page: tables, and pictures beside each other."""
+    """A section of the page with a title, tables, and pictures side by side."""
 
     title: str
     parts: Sequence[Picture | Table]
 
 
 def page(title: str, lead: Sequence[str], sections: Sequence[Section]) -> bytes:
-    """Return the page in the style of ``manitwin stats``; the same content gives the same bytes."""
+    """Return the HTML page in the style of ``manitwin stats``; equal content gives equal bytes."""
     style = resources.files("manitwin.dataset.statistics").joinpath("report.css").read_text(encoding="utf-8")
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -76,7 +76,7 @@ def _figure(picture: Picture) -> str:
 
 
 def _table(table: Table) -> str:
-    """Return a table; columns of texts are read from the left, those of numbers stand at the right."""
+    """Return an HTML table; columns of text are left-aligned, columns of numbers right-aligned."""
     texts = [any(_is_text(row[place]) for row in table.rows) for place in range(len(table.headings))]
     kinds = [' class="text"' if is_text or not place else "" for place, is_text in enumerate(texts)]
     heads = "".join(
@@ -95,7 +95,7 @@ def _table(table: Table) -> str:
 
 
 def _is_text(value: str | int | float | None) -> bool:
-    """Tell whether a value is words, and no number with its unit or interval."""
+    """Return whether a value is text rather than a number with a unit or interval."""
     return isinstance(value, str) and value != "" and not (value[0].isdigit() or value[0] in "+-−–±")
 
 

@@ -1,1 +1,1 @@
-"""The catalogue of a collection: what could be made into twins, whence it is, and under which licence."""
+"""Collection of inputs for a data set: a catalogue of candidate photos and meshes with their sources and licences."""

@@ -1,4 +1,4 @@
-"""Mark inputs of a catalogue that look like an earlier one: the same photo in another size, the same mesh in another format."""
+"""Near-duplicate inputs of a catalogue, such as the same photo in another size or the same mesh in another format."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ BATCH = 100
 
 
 def mark_alike(catalogue: Path) -> dict[str, int]:
-    """Look at every file that was not looked at before, and mark what looks like an earlier one as its duplicate.
+    """Compute the missing look vectors of all files, and mark files that look like an earlier file as its duplicates.
 
-    Returns how many there are by ``picture`` and by ``shape``. Each file is read in a process with limits; one that cannot be
-    read is like no other. Of several that are alike the first that came stays. Raises UsageError where there is no catalogue,
-    Unavailable without the network's weights.
+    Returns the number of duplicates per kind, ``picture`` and ``shape``. Each file is read in a process with resource limits; a
+    file that cannot be read is never a duplicate. Of similar files, the first in the catalogue stays. Raises UsageError if there
+    is no catalogue, and Unavailable without the weights of the network.
     """
-    load_weights()  # asked before anything is read
+    load_weights()  # fails before any file is read
     with Catalogue(catalogue) as store:
         waiting = iter(store.without_look(VERSION))
         while batch := list(islice(waiting, BATCH)):
@@ -46,7 +46,9 @@ def _look(place: str, kind: str) -> bytes | None:
 
 
 def _alike(looks: list[tuple[str, str, bytes]]) -> Iterator[tuple[str, str, str]]:
-    """Yield the digest of each that looks like an earlier one that does not, with the digest of that, and by what."""
+    """Yield digest, digest of the original, and kind for each input that looks like an earlier input that is no
+    duplicate itself.
+    """
     for by in (PICTURE, SHAPE):
         mine = [(digest, look) for digest, kind, look in looks if (kind == "image") == (by == PICTURE)]
         if not mine:

@@ -1,4 +1,4 @@
-"""Have a text-to-image model draw what a plan is short of, each sentence once, with what was paid remembered."""
+"""Text-to-image drawing of the inputs that a plan lacks: each prompt is drawn once, and paid jobs are remembered."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from manitwin.twin.store import write_bytes_atomically
 PICTURES, ANSWERS, JOBS, WORK = "pictures", "answers", "jobs", "work"
 MANIFEST, REFUSED = "manifest.csv", "refused.csv"
 STYLE = ", alone and whole in the picture, product photo, plain light grey background, soft even light"
-"""What a photo needs that a thing is cut out of; the sentences of a plan say only the thing."""
+"""Photographic requirements for segmenting the object; the prompts of a plan describe only the object itself."""
 MOST_PROMPTS = 1_000_000
 _SUFFIXES = {"jpeg": ".jpg"}
 
 
 @dataclass(frozen=True)
 class Prompt:
-    """A sentence and the name of its thing."""
+    """A text prompt and the name of the object it describes."""
 
     text: str
     name: str
@@ -42,7 +42,7 @@ class Prompt:
 
 @dataclass
 class Drawn:
-    """What a run came to: pictures that were made, there before, refused by the model, and not begun for the budget's sake."""
+    """Result of a run: pictures made, already present and refused by the model, and why it stopped early (None: it did not)."""
 
     made: int = 0
     there: int = 0
@@ -78,11 +78,11 @@ def draw_pictures(
     said: Callable[[str], None] = lambda line: None,
     sleep: Callable[[float], None] = time.sleep,
 ) -> Drawn:
-    """Draw each prompt into ``out/pictures`` and write ``out/manifest.csv``, which a build and ``collect add`` read.
+    """Draw each prompt into ``out/pictures`` and write ``out/manifest.csv``, which ``build`` and ``collect add`` read.
 
-    What is there is not asked again; a job that was begun is asked after, and not paid twice; what the model refused
-    (``refused.csv``) is not asked again. Before each that costs something ``services.max_cost_usd`` is looked at, and ``stopped``
-    says where it ended. Raises what the painter raises beside refusals, with all that was made in the manifest.
+    Existing pictures are not requested again, pending jobs are resumed and not paid twice, and prompts that the model refused
+    (``refused.csv``) are skipped. The budget ``services.max_cost_usd`` is checked before each paid job; ``stopped`` says why the
+    run ended early. Raises the painter's errors other than refusals; pictures made until then are in the manifest.
     """
     require_writable_folder(out)
     for folder in (PICTURES, WORK):

@@ -1,4 +1,4 @@
-"""What is known of an input before anything is made of it: its category and group, and how large such things are."""
+"""Facts about an input known before it is processed: category, group and typical size."""
 
 from __future__ import annotations
 
@@ -24,15 +24,16 @@ GROUP_OF_DOMAIN = {
     "toys": "household",
     "food": "household",
 }
-"""The group of each domain of the priors, as the paper sorts them (section 4): bottles are kitchen, toys and food household;
-furniture, which it has none of, is household too."""
+"""Group of each domain of the priors, as in the paper (section 4): bottles are kitchen, toys and food household. Furniture, which
+the paper does not have, is household too.
+"""
 SIZE_BANDS_M = (0.02, 0.05, 0.10, 0.20, 0.37)
-"""The edges of the bands of size; the first and the last are the smallest and largest object of the paper (table 3)."""
+"""Edges of the size bands in metres. The first and the last are the smallest and largest object of the paper (table 3)."""
 _COUNTING = re.compile(r"[\d_\-.]+")
 
 
 class Facts(NamedTuple):
-    """The category of the priors (``unknown``: none is known), its group, and the longest axis with what it is from."""
+    """Category of the priors (``unknown`` if none matches), its group, and the longest axis in metres with its source."""
 
     category: str
     group: str
@@ -41,9 +42,9 @@ class Facts(NamedTuple):
 
 
 def facts_of(name: str | None, size_m: float | None) -> Facts:
-    """Return what a name says of a thing; ``size_m`` is the longest axis where somebody gave it, else the prior's typical one.
+    """Return the facts that a name implies. The size is ``size_m`` (longest axis) if given, else the typical size of the prior.
 
-    A name that no prior has leaves category, group and size unknown.
+    A name that matches no prior leaves category, group and size unknown.
     """
     known = _of_name(name or "")
     return known if size_m is None else known._replace(size_m=size_m, size_source="given")
@@ -59,13 +60,15 @@ def _of_name(name: str) -> Facts:
 
 
 def name_of_file(stem: str, folder: str) -> str | None:
-    """Return the words of a file's name, or of its folder's, that name a category: ``claw_hammer-02`` is a claw hammer."""
+    """Return the words of a file's name, else of its folder's name, that match a category: ``claw_hammer-02`` is a
+    claw hammer.
+    """
     words = (" ".join(_COUNTING.sub(" ", text).split()) for text in (stem, folder))
     return next((each for each in words if each and _of_name(each).category != UNKNOWN), None)
 
 
 def band_of(size_m: float | None) -> str:
-    """Return the band of a longest axis in metres, in words of centimetres; ``unknown`` for None."""
+    """Return the size band of a longest axis in metres as text in centimetres; ``unknown`` for None."""
     if size_m is None:
         return UNKNOWN
     edges = [f"{edge * 100:g}" for edge in SIZE_BANDS_M]
@@ -78,4 +81,4 @@ def band_of(size_m: float | None) -> str:
 
 
 BANDS = (*(band_of(size) for size in (0.01, *SIZE_BANDS_M[1:], 1.0)), UNKNOWN)
-"""All bands, the smallest first."""
+"""All bands, smallest first."""

@@ -1,4 +1,4 @@
-"""Take inputs into a catalogue: every file of a folder, every row of a list, each as a row or as a counted refusal."""
+"""Adding inputs to a catalogue: every file of a folder or entry of a list becomes either a row or a counted refusal."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from manitwin.pipeline.manifest_item import unusable
 from manitwin.twin.import_record import IMPORTED_MESH
 
 MAX_INPUT_BYTES = 1 << 30
-"""A larger file is not hashed, and not planned: photos and meshes of one thing are far below."""
+"""Size limit of an input file; larger files are neither hashed nor planned. Photos and meshes of one object are far smaller."""
 BATCH = 500
-"""Rows of one transaction: so many at most are read again after an interruption."""
+"""Rows per transaction, and so the most that are read again after an interruption."""
 _CAUSE_CHARACTERS, _CAUSES = 200, 1000
 
 
 @dataclass(frozen=True)
 class Given:
-    """What the command line says of all inputs; what a list says of one comes first."""
+    """Values from the command line for all inputs; values of a list entry take precedence."""
 
     source: str | None = None
     licence: str | None = None
@@ -47,13 +47,13 @@ class Given:
 
 @dataclass
 class Added:
-    """What became of the entries of one folder or list: new, changed and unchanged rows, and what became none."""
+    """Outcome for the entries of one folder or list: new, changed and unchanged rows, and entries that became no row."""
 
     new: int = 0
     changed: int = 0
     unchanged: int = 0
     repeated: int = 0
-    """Entries that name a place which an earlier entry has named."""
+    """Entries whose place an earlier entry has named."""
     unreadable: dict[str, int] = field(default_factory=dict)
     refused: list[Refused] = field(default_factory=list)
     parts: int = 0
@@ -61,16 +61,16 @@ class Added:
 
     @property
     def entries(self) -> int:
-        """All entries, of which each is counted once; rows that cannot be read are among new, changed and unchanged."""
+        """Number of entries, each counted once; unreadable rows are counted among new, changed and unchanged."""
         return self.new + self.changed + self.unchanged + self.repeated + sum(r.count for r in self.refused)
 
 
 def add(catalogue: Path, given_place: Path, given: Given, root: Path | None = None) -> Added:
-    """Add a folder of photos and meshes, or a CSV or JSONL list, to a catalogue, which is made where there is none.
+    """Add a folder of photos and meshes, or a CSV or JSONL list, to a catalogue, which is created if missing.
 
-    Files of a list lie below ``root``: the list's own folder by default; of a data set's listing, files are meant only where it
-    is given. Raises UsageError for what is neither, a list that is broken as a whole (nothing of it is added then), and a source
-    that nobody has named.
+    The files of a list are relative to ``root``, by default the folder of the list. For the published listing of a data set,
+    entries refer to files only if ``root`` is given, else to their URLs. Raises UsageError for any other place, for a list that
+    is malformed as a whole (nothing of it is added), and if the source is not stated.
     """
     _require_usable(given)
     require_place(given_place, given.source, root)
@@ -94,12 +94,12 @@ def _require_usable(given: Given) -> None:
 
 
 def _rows_of(path: Path, *, files: bool) -> int:
-    """Return how many rows a list has; reads it to its end, so that one that is broken adds nothing."""
+    """Return the number of rows of a list. It reads the whole list first, so that nothing of a malformed list is added."""
     return sum(1 for _ in read_list(path, files=files))
 
 
 class _Intake:
-    """One folder or list on its way into a catalogue."""
+    """Adds one folder or list to a catalogue."""
 
     def __init__(self, store: Catalogue, place: Path, given: Given, root: Path, *, files: bool):
         self._store, self._place, self._given, self._files = store, place, given, files
@@ -212,9 +212,9 @@ def _kind(place: str) -> Kind | None:
 
 
 def _read(row: Row, before: Row | None, root: Path) -> Row:
-    """Return the row with the digest, size and time of its file, or with the cause why it cannot be read.
+    """Return the row with its file's digest, size and modification time, or with the cause why the file is unreadable.
 
-    A file of the size and time that the catalogue has is not read again.
+    A file whose size and modification time match the catalogue is not read again.
     """
     path = Path(row.place, IMPORTED_MESH) if row.kind == "asset" else Path(row.place)
     try:
@@ -236,7 +236,7 @@ def _read(row: Row, before: Row | None, root: Path) -> Row:
 
 
 def _kept(row: Row, before: Row) -> Row:
-    """Return a row in which what is left open now stays as it was said before."""
+    """Return the new row with its unknown values filled in from the previous row."""
     if row.licence == UNKNOWN:
         row = replace(row, licence=before.licence)
     if row.name is None:

@@ -1,4 +1,4 @@
-"""One row of a list that others wrote (CSV, JSONL): what it names and says, or why it cannot become a row."""
+"""Parsing of external lists (CSV, JSONL): each entry becomes a validated record or a cause of refusal."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from manitwin.formats.printable import printable_line
 from manitwin.pipeline.manifest_item import unusable
 
 COLUMNS = ("file", "url", "name", "source", "license", "attribution", "size_m")
-"""What is read of a row; ``path``, ``category`` and ``licence`` are other names of file, name and license."""
+"""Columns that are read; ``path``, ``category`` and ``licence`` are synonyms of file, name and license."""
 OTHER_NAMES = {"path": "file", "category": "name", "licence": "license"}
 LONGEST_URL = 2048
 LARGEST_SIZE_M = 100.0
@@ -26,12 +26,14 @@ _UNSAID = frozenset({"", "none", "null", "n/a", "todo", "?", UNKNOWN})
 
 
 class Unreadable(Exception):
-    """An entry that becomes no row: one cause, in words that entries share."""
+    """An entry that cannot become a row. The message is a cause worded without details, so that entries with it can
+    be counted.
+    """
 
 
 @dataclass(frozen=True)
 class Listed:
-    """What a row says: a ``file`` as it is written there, or a ``url``; None is what it leaves open."""
+    """Values of a list entry: ``file`` as written there, or ``url``; None for values that are not stated."""
 
     file: str | None
     url: str | None
@@ -43,11 +45,10 @@ class Listed:
 
 
 def read_list(path: Path, *, files: bool = False) -> Iterator[tuple[int, Listed | Unreadable]]:
-    """Yield the rows of a list with their lines; raises UsageError where the file as a whole is none.
+    """Yield the line number and entry of each row of a list; raises UsageError if the file as a whole is malformed.
 
-    ``files``: of a data set's listing the files are meant, not their addresses.
-
-    A wrong line of JSON costs that row; a CSV whose quotes are not closed has no rows that could be trusted behind it.
+    ``files`` makes the entries of a data set's listing refer to files instead of URLs. A malformed JSON line invalidates only
+    that row. A CSV with an unclosed quote fails as a whole, since the rows after it cannot be trusted.
     """
     for line, row in _rows(path, files=files):
         try:
@@ -95,7 +96,7 @@ def _listed(row: Mapping[str, Any]) -> Listed:
 
 
 def licence_or_none(text: str | None) -> str | None:
-    """Return a licence by its SPDX name where that is known, else as it is written; None for words that say nothing."""
+    """Return the SPDX identifier of a known licence, other licences as written, and None for placeholder words."""
     if text is None or text.strip().lower() in _UNSAID:
         return None
     return LICENCES.get(text.strip().lower(), text.strip())
@@ -144,5 +145,5 @@ def _size(value: Any) -> float | None:
 
 
 def example_of(path: Path, line: int) -> str:
-    """Return where an entry stands, for a person."""
+    """Return the location ``file:line`` of an entry for messages."""
     return printable_line(f"{path}:{line}", max_characters=200)

@@ -1,8 +1,8 @@
-"""Listings that data sets of meshes come with, as rows of a list: Objaverse's metadata, and models of Gazebo Fuel.
+"""Published listings of mesh data sets as list entries: Objaverse metadata and Gazebo Fuel models.
 
 Objaverse 1.0 (Deitke et al. 2023) has ``metadata/<shard>.json.gz``, an object of annotations by uid, and
-``glbs/<shard>/<uid>.glb``. Fuel, where Google's scanned objects are, answers ``GET /1.0/OWNER/models`` with a JSON list of
-models; an unpacked one has ``NAME/meshes/model.obj``.
+``glbs/<shard>/<uid>.glb``. Fuel, which hosts Google Scanned Objects, answers ``GET /1.0/OWNER/models`` with a JSON list of
+models; an unpacked model has ``NAME/meshes/model.obj``.
 """
 
 from __future__ import annotations
@@ -38,20 +38,20 @@ LICENCES = {
     "creative commons - attribution": "CC-BY-4.0",
     "creative commons zero v1.0 universal": "CC0-1.0",
 }
-"""What people and listings call a licence, by its SPDX name; others stay as they are written."""
+"""SPDX identifiers of the licence names used in listings; other names stay as they are written."""
 
 
 def is_listing(path: Path) -> bool:
-    """Tell by its name whether a file is one."""
+    """Return whether a file is a listing, judged by its suffix."""
     return path.name.lower().endswith(SUFFIXES)
 
 
 def read_listing(path: Path, *, files: bool) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the entries of a listing with their numbers as rows of a list; raises UsageError for JSON that is no such listing.
+    """Yield the number and row of each entry of a listing; raises UsageError for JSON of an unknown form.
 
-    With ``files`` a row names the file below the data set's folder, else the address where the thing is shown.
+    With ``files``, a row names the file below the data set's folder, else the URL of the object's web page.
     """
-    from manitwin.formats.json_file import parse_json  # imports NumPy, and a place that is no listing does not need it
+    from manitwin.formats.json_file import parse_json  # imports NumPy, which only listings need
 
     told = parse_json(_text(path), str(path), UsageError, remedy="give the file as it was published")
     if isinstance(told, dict) and told and all(isinstance(each, dict) and "license" in each for each in told.values()):
@@ -98,7 +98,7 @@ def _of_objaverse(uid: str, told: dict[str, Any], shard: str, *, files: bool) ->
 def _of_fuel(told: dict[str, Any], *, files: bool) -> dict[str, Any]:
     owner, name = told.get("owner"), told.get("name")
     if not isinstance(owner, str) or not isinstance(name, str):
-        return {"name": name, "source": owner}  # no place: a row says so
+        return {"name": name, "source": owner}  # a row without a place is refused later
     address = f"{FUEL}/{quote(owner)}/models/{quote(name)}"
     place = {"file": f"{name}/meshes/model.obj"} if files else {"url": address}
     words = " ".join(name.replace("_", " ").split())

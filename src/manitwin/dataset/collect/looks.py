@@ -1,9 +1,9 @@
-"""What an input looks like, as a vector by which near-duplicates are told: of a picture its look, of a mesh its shape.
+"""Feature vectors of inputs for near-duplicate detection: appearance of pictures, shape of meshes.
 
-Pictures: the features of EfficientNet-Lite0 and the colours of ``models.embedders.looks``, brought to 256 numbers by a fixed
-random projection (Johnson and Lindenstrauss 1984). Meshes: the histogram of the distances of random pairs of surface points (D2
-of Osada et al. 2002), in the square roots of its shares, and the sides of the box along the principal axes; size and turn do
-not matter.
+Pictures: features of EfficientNet-Lite0 and the colours of ``models.embedders.looks``, reduced to 256 numbers by a fixed random
+projection (Johnson and Lindenstrauss 1984). Meshes: square roots of the D2 shape distribution, the histogram of distances of
+random pairs of surface points (Osada et al. 2002), and the side lengths of the box along the principal axes. The shape vector is
+invariant to scale and rotation.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ from manitwin.render.raycast import merged
 from manitwin.twin.import_record import IMPORTED_MESH
 
 VERSION = 1
-"""Looks of another version are made again."""
+"""Version of the vectors; those of other versions are recomputed."""
 PICTURE, SHAPE = "picture", "shape"
 ALIKE = {PICTURE: 0.93, SHAPE: 0.995}
-"""From so much on two are alike: between what is left after changes of who passes files on, and what other things have
-(``benchmarks/alike.py``, on public assets)."""
+"""Similarity at or above which two inputs are duplicates. The values lie between the similarities of re-encoded or re-exported
+copies and those of different objects (``benchmarks/alike.py``, on public assets).
+"""
 NEAR_SIDES = 0.03
-"""Of the longest side: how far the sides of two boxes may be apart."""
+"""Maximum difference of corresponding box sides, relative to the longest side."""
 _KEPT = 256
 _SIDE_PX = 448
 _POINTS, _PAIRS, _BINS, _ALMOST_ALL = 4000, 200_000, 64, 0.999
@@ -37,7 +38,7 @@ _LIMITS = MeshLimits(max_bytes=1 << 28, max_faces=2_000_000, decode_textures=Fal
 
 
 def look_of_input(place: str, kind: str) -> bytes | None:
-    """Return the look of a file (``float16``, little-endian), None where it is broken or shows nothing."""
+    """Return the feature vector of a file as little-endian ``float16`` bytes; None if the file is broken or shows nothing."""
     try:
         vector = picture_look(_rgb(Path(place))) if kind == "image" else _shape(Path(place), kind)
     except (ManiTwinError, ValueError):
@@ -46,7 +47,7 @@ def look_of_input(place: str, kind: str) -> bytes | None:
 
 
 def similarity(first: np.ndarray, others: np.ndarray, by: str) -> np.ndarray:
-    """Return how alike a look ``(L,)`` is to others ``(N, L)``, 1 for the same; shapes of other boxes are not alike at all."""
+    """Return the similarity of a vector ``(L,)`` to others ``(N, L)``, 1 for equal ones; 0 for shapes whose box sides differ."""
     if by == PICTURE:
         return np.asarray(others @ first)
     apart = np.abs(others[:, _BINS:] - first[_BINS:]).max(1)
@@ -54,7 +55,7 @@ def similarity(first: np.ndarray, others: np.ndarray, by: str) -> np.ndarray:
 
 
 def _rgb(path: Path) -> np.ndarray:
-    """Return a photo on white ``(H, W, 3) uint8``."""
+    """Return a photo composited on white ``(H, W, 3) uint8``."""
     pixels = read_image(path, max_side_px=_SIDE_PX).pixels
     if pixels.shape[2] == 3:
         return pixels
@@ -63,7 +64,7 @@ def _rgb(path: Path) -> np.ndarray:
 
 
 def picture_look(rgb: np.ndarray) -> np.ndarray:
-    """Return the look of a picture ``(H, W, 3) uint8``, of unit length ``(256,) float32``."""
+    """Return the unit feature vector ``(256,) float32`` of a picture ``(H, W, 3) uint8``."""
     whole = look_of(rgb, np.ones(rgb.shape[:2], np.float32))
     projected = _projection() @ whole
     return np.asarray(projected / max(float(np.linalg.norm(projected)), 1e-9), np.float32)
@@ -80,7 +81,7 @@ def _shape(path: Path, kind: str) -> np.ndarray:
 
 
 def shape_look(mesh: trimesh.Trimesh) -> np.ndarray:
-    """Return the look of a surface ``(67,) float32``; raises ValueError for one without area."""
+    """Return the shape vector ``(67,) float32`` of a surface; raises ValueError for a surface without area."""
     if not float(mesh.area) > 0:
         raise ValueError("a surface without area has no shape")
     rng = np.random.default_rng(VERSION)

@@ -1,4 +1,4 @@
-"""What a catalogue takes inputs from, a folder or a list: checked by the arguments alone, before anything is read."""
+"""Check of the places that ``collect add`` accepts, a folder or a list, by the arguments alone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LIST_SUFFIXES = frozenset({".csv", ".jsonl"})
 
 
 def require_place(place: Path, source: str | None, root: Path | None) -> None:
-    """Raise UsageError where a place is neither, a folder is of no named source, or a root is given for a folder."""
+    """Raise UsageError for a place that is neither folder nor list, a folder without a source, or a folder with a root."""
     if not place.is_dir():
         if place.suffix.lower() not in LIST_SUFFIXES and not is_listing(place):
             raise UsageError(

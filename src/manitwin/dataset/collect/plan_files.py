@@ -1,4 +1,4 @@
-"""Write a plan as manifests that ``manitwin build`` reads."""
+"""Write a collection plan as manifests that ``manitwin build`` reads."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from manitwin.twin.store import write_bytes_atomically
 MANIFEST, PROMPTS, SUMMARY = "manifest.csv", "prompts.csv", "plan.json"
 _COLUMNS = ("file", "name", "license", "attribution")
 _MASK = "mask"
-"""A further column, where a photo of the plan has a mask beside it."""
+"""Additional column if any photo of the plan has a mask file."""
 
 
 def write_plan(plan: CollectPlan, folder: Path) -> list[Path]:
-    """Write ``manifest.csv`` (what is there), ``prompts.csv`` (texts for what is short) and ``plan.json``; return their paths.
+    """Write ``manifest.csv`` (chosen inputs), ``prompts.csv`` (prompts for missing inputs) and ``plan.json``; return their paths.
 
-    Both tables are manifests: ``manitwin build FOLDER/manifest.csv -o DATASET``. Raises UsageError where nothing can be written.
+    Both tables are manifests: ``manitwin build FOLDER/manifest.csv -o DATASET``. Raises UsageError if the folder is not writable.
     """
     require_writable_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)

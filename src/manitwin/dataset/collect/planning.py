@@ -1,4 +1,4 @@
-"""Plan which inputs to build, as evenly over groups, sizes and categories as they allow, and prompts for what is short."""
+"""Plan a balanced set of inputs over groups, size bands and categories, with prompts for the missing ones."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from manitwin.dataset.collect.store import Row
 from manitwin.models.annotators.priors import load_priors
 
 INSIDE = BANDS[1:-2]
-"""The bands from 2 to 37 cm: neither below nor above, nor unknown."""
+"""The bands from 2 to 37 cm, without those below, above and unknown."""
 
 
 @dataclass(frozen=True)
 class Prompt:
-    """A text for a generator; ``category`` is what it is to show."""
+    """A prompt for a generator; ``category`` is the category of the object it describes."""
 
     text: str
     category: str
@@ -28,9 +28,10 @@ class Prompt:
 
 @dataclass(frozen=True)
 class CollectPlan:
-    """What to build: ``chosen`` rows, ``prompts`` for the rest, and per group how many were wanted and are ``there``.
+    """The planned inputs: ``chosen`` rows, ``prompts`` for the rest, and per group the number ``wanted`` and the number
+    ``there``.
 
-    ``left_out`` counts by cause what could not be chosen from.
+    ``left_out`` counts the rows that were not eligible, by cause.
     """
 
     items: int
@@ -44,12 +45,12 @@ class CollectPlan:
 def plan_inputs(
     rows: Iterable[Row], items: int, *, seed: int = 0, licenses: Sequence[str] | None = None
 ) -> CollectPlan:
-    """Choose ``items`` inputs of usable rows, an equal share for each of the six groups.
+    """Choose ``items`` inputs from the eligible rows, an equal share for each of the six groups.
 
-    Within a group the size bands, and within a band the categories, are served in turn, so that none is chosen twice as long
-    as another one has not had its turn. What a group has not is asked for by prompts, the categories with the fewest inputs
-    first. Addresses, rows of an unknown licence (or none of ``licenses``), of an unknown category, or of a size outside
-    of 2 to 37 cm are left out and counted. The same rows, number and seed give the same plan.
+    Rows are taken in round-robin order over the size bands of a group, and within a band over its categories. Prompts fill the
+    shortfall of a group, starting with the categories that have the fewest inputs. URLs, rows of an unknown licence (or of none
+    in ``licenses``), of an unknown category, or of a size outside 2 to 37 cm are left out and counted. Equal rows, number and
+    seed give the same plan.
     """
     by_cell: dict[str, dict[str, dict[str, list[Row]]]] = {
         group: defaultdict(lambda: defaultdict(list)) for group in GROUPS
@@ -81,7 +82,7 @@ def plan_inputs(
 
 
 def shares(items: int, parts: int) -> list[int]:
-    """Return ``items`` as ``parts`` whole numbers that differ by one at most, the larger ones first."""
+    """Split ``items`` into ``parts`` integers that differ by at most one, larger ones first."""
     return [items // parts + (number < items % parts) for number in range(parts)]
 
 
@@ -92,7 +93,7 @@ def _why_left_out(row: Row, licenses: Sequence[str] | None) -> str | None:
         return "unknown licence"
     if licenses is not None and row.licence.lower() not in {
         each.strip().lower() for each in licenses
-    }:  # SPDX 2.3, annex D.2
+    }:  # SPDX 2.3, annex D.2: identifiers are matched case-insensitively
         return "licence not among those allowed"
     if row.grp == UNKNOWN:
         return "unknown category"
@@ -100,7 +101,7 @@ def _why_left_out(row: Row, licenses: Sequence[str] | None) -> str | None:
 
 
 def _in_turn(bands: Mapping[str, Mapping[str, list[Row]]], count: int, seed: int) -> list[Row]:
-    """Return up to ``count`` rows, a band at a time and within it a category at a time."""
+    """Return up to ``count`` rows, alternating over the bands and, within a band, over the categories."""
     queues = []
     for band in INSIDE:
         categories = bands.get(band, {})
@@ -116,7 +117,7 @@ def _in_turn(bands: Mapping[str, Mapping[str, list[Row]]], count: int, seed: int
 
 
 def _prompts(group: str, count: int, there: Sequence[Row], seed: int) -> list[Prompt]:
-    """Return texts for categories of a group, those with the fewest inputs first."""
+    """Return ``count`` prompts for categories of a group, those with the fewest inputs first."""
     if count <= 0:
         return []
     have: dict[str, int] = defaultdict(int)

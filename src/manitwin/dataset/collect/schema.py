@@ -1,11 +1,11 @@
-"""The schema of a catalogue as numbered steps; ``PRAGMA user_version`` says how many a file has taken."""
+"""SQLite schema of a catalogue as numbered migrations; ``PRAGMA user_version`` counts those that a file has."""
 
 from __future__ import annotations
 
 import sqlite3
 
 APPLICATION = 0x4D54434C
-"""``PRAGMA application_id``, which tells a catalogue from another program's SQLite file: the letters MTCL."""
+"""``PRAGMA application_id`` that identifies a catalogue among SQLite files: the letters MTCL."""
 
 MIGRATIONS = (
     """
@@ -52,6 +52,6 @@ MIGRATIONS = (
 
 
 def migrate(connection: sqlite3.Connection, version: int = 0) -> None:
-    """Bring a catalogue from a version to the newest schema, each step a transaction."""
+    """Migrate a catalogue from a version to the newest schema, one transaction per step."""
     for number, script in enumerate(MIGRATIONS[version:], version + 1):
         connection.executescript(f"BEGIN IMMEDIATE; {script}; PRAGMA user_version = {number}; COMMIT;")

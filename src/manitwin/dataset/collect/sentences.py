@@ -1,4 +1,4 @@
-"""Sentences that ask a text-to-image or text-to-3D model for one thing of a category."""
+"""Prompt templates that ask a text-to-image or text-to-3D model for a single object of a category."""
 
 from __future__ import annotations
 
@@ -27,11 +27,13 @@ SENTENCES = (
     "a simple, sturdy {thing} of {material}",
     "a {thing} with rounded edges, {color}",
 )
-"""Of one thing each, and nothing beside it: background and light are for whoever asks a model for pictures."""
+"""Templates that describe one object only. Background and lighting are added by the code that requests pictures."""
 
 
 def sentence(prior: Prior, number: int, rng: np.random.Generator) -> str:
-    """Return one of ``SENTENCES`` about a category; colours are drawn, materials and sizes are the prior's."""
+    """Return template ``number`` of ``SENTENCES`` for a category; colours are random, material and sizes are those of
+    the prior.
+    """
     color, other_color = rng.choice(COLORS, 2, replace=False)
     size = prior.longest_axis_m
     said = SENTENCES[number].format(

@@ -1,4 +1,4 @@
-"""What a catalogue has: its rows counted by what they are, and what could not be read."""
+"""Summary of a catalogue: row counts by property, and the inputs that could not be read."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _IN_ORDER = {"group": (*GROUPS, UNKNOWN), "status": STATES, "size_band": BANDS}
 
 @dataclass(frozen=True)
 class CatalogueStatus:
-    """Rows in all, rows by each column that is counted, causes of unreadable rows, and entries that became no row.
+    """Total number of rows, counts per column value, causes of unreadable rows, and entries that became no row.
 
-    ``licence_known`` are ready or listed rows with a licence.
+    ``licence_known`` counts the ready or listed rows with a known licence.
     """
 
     rows: int
@@ -44,7 +44,7 @@ class CatalogueStatus:
         }
 
     def lines(self) -> list[str]:
-        """Return what a person reads."""
+        """Return the summary as lines of text."""
         lines = [f"{self.rows:,} rows; {self.licence_known:,} that could be used have a licence that is known"]
         for name, counts in self.counts.items():
             shown = list(counts.items())
@@ -57,7 +57,7 @@ class CatalogueStatus:
 
 
 def catalogue_status(path: Path) -> CatalogueStatus:
-    """Return what a catalogue has; raises UsageError where there is none that can be read."""
+    """Return the status of a catalogue; raises UsageError if it is missing or unreadable."""
     with Catalogue(path) as catalogue:
         counts = catalogue.counts()
         usable = sum(
@@ -74,7 +74,7 @@ def catalogue_status(path: Path) -> CatalogueStatus:
 
 
 def _ordered(name: str, counts: dict[str, int]) -> dict[str, int]:
-    """Return counts in the order of what they are of; of free words the most frequent first."""
+    """Return counts in the fixed order of a column; columns of free text are sorted by descending count."""
     order = _IN_ORDER.get(name)
     if order is not None:
         return {value: counts.get(value, 0) for value in order}

@@ -1,4 +1,4 @@
-"""The catalogue: one SQLite file of inputs, in which a row is one place, and what was committed is on the disk."""
+"""Catalogue storage: one SQLite file with one row per input place. Committed rows are durable."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Kind = Literal["image", "mesh", "asset", "url"]
 Status = Literal["ready", "listed", "duplicate", "unreadable"]
 _DAMAGED = "is not a readable catalogue ({cause}); give another"
 COUNTED = ("group", "status", "licence", "source", "size_band")
-"""What the rows are counted by."""
+"""Columns by which rows are counted."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One input: ``status`` ready (a file that was read), listed (a URL), or unreadable, with its ``cause``."""
+    """One input. ``status`` is ready (the file was read), listed (a URL), duplicate, or unreadable with a ``cause``."""
 
     place: str
     kind: Kind
@@ -48,7 +48,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Refused:
-    """How many entries of a list became no row for one cause, and the first of them."""
+    """Number of entries of a list that became no row for one cause, with the first as an example."""
 
     list: str
     cause: str
@@ -68,11 +68,11 @@ _MARK_ALIKE = (
     " (SELECT min(number) FROM inputs AS other JOIN looks ON looks.alike = other.sha256 WHERE looks.sha256 = inputs.sha256)"
     " WHERE status = 'ready' AND sha256 IN (SELECT looks.sha256 FROM looks JOIN inputs AS other ON other.sha256 = alike)"
 )
-"""What looks like an earlier input is its duplicate, while that is there."""
+"""Marks an input as a duplicate of the earlier input that it looks like, as long as that input exists."""
 
 
 class Catalogue:
-    """One catalogue, open; raises UsageError where there is none and ``make`` is False, and for a file that is none."""
+    """An open catalogue. Raises UsageError if the file is missing and ``make`` is False, or is not a catalogue."""
 
     def __init__(self, path: Path, *, make: bool = False):
         self.path = path
@@ -115,7 +115,7 @@ class Catalogue:
         self._connection.close()
 
     def known(self, places: Iterable[str]) -> dict[str, Row]:
-        """Return the rows that are there of some places; a duplicate comes back as ready, which it is too."""
+        """Return the existing rows of some places, keyed by place; duplicates are returned as ready."""
         found = {}
         for place in places:
             with self._sound():
@@ -128,14 +128,14 @@ class Catalogue:
         return found
 
     def put(self, rows: Iterable[Row]) -> None:
-        """Add rows in one transaction; of a place that is there already the row keeps its number and says what is new."""
+        """Insert or update rows in one transaction. The row of a known place keeps its number."""
         with self._writing() as connection:
             connection.executemany(_UPSERT, [asdict(row) for row in rows])
 
     def finish(self, list_: str, refused: Iterable[Refused]) -> None:
-        """Keep what a list had that became no row, in place of what was kept of it, and mark files of the same bytes.
+        """Replace the refusals of a list, and mark files with equal bytes.
 
-        Of equal files the first that came stays ready; the others are duplicates and say of whom.
+        Of equal files the first stays ready; the others become duplicates that refer to it.
         """
         with self._writing() as connection:
             connection.execute("DELETE FROM refused WHERE list = ?", (list_,))
@@ -155,7 +155,7 @@ class Catalogue:
             connection.execute(_MARK_ALIKE)
 
     def without_look(self, version: int) -> list[tuple[str, str, str]]:
-        """Return digest, place and kind of each file that is ready and has no look of a version, in the order they came."""
+        """Return digest, place and kind of each ready file without a vector of this version, in catalogue order."""
         with self._sound():
             return self._connection.execute(
                 "SELECT sha256, place, kind FROM inputs WHERE status = 'ready' AND sha256 IS NOT NULL AND NOT EXISTS"
@@ -164,7 +164,7 @@ class Catalogue:
             ).fetchall()
 
     def put_looks(self, version: int, looks: Iterable[tuple[str, bytes | None]]) -> None:
-        """Keep the looks of files by their digests."""
+        """Store the vectors of files by their digests."""
         with self._writing() as connection:
             connection.executemany(
                 "INSERT OR REPLACE INTO looks VALUES (?, ?, ?, NULL)",
@@ -172,7 +172,7 @@ class Catalogue:
             )
 
     def looks(self, version: int) -> list[tuple[str, str, bytes]]:
-        """Return digest, kind and look of each first file of its bytes that has one, in the order they came."""
+        """Return digest, kind and vector of each file that has one, in catalogue order, one per distinct content."""
         with self._sound():
             return self._connection.execute(
                 "SELECT inputs.sha256, kind, look FROM inputs JOIN looks USING (sha256) WHERE version = ? AND look IS NOT NULL"
@@ -181,7 +181,7 @@ class Catalogue:
             ).fetchall()
 
     def put_alike(self, alike: Mapping[str, str]) -> None:
-        """Keep which file looks like which earlier one, by their digests, in place of what was kept, and mark them."""
+        """Replace the near-duplicate relations (digest to digest of the earlier file) and mark the duplicates."""
         with self._writing() as connection:
             connection.execute(
                 "UPDATE inputs SET status = 'ready', duplicate_of = NULL WHERE status = 'duplicate' AND number ="
@@ -194,7 +194,7 @@ class Catalogue:
             connection.execute(_MARK_ALIKE)
 
     def ready(self) -> Iterator[Row]:
-        """Yield the rows that can be used, addresses too, in the order in which they came."""
+        """Yield the usable rows, including URLs, in catalogue order."""
         with self._sound():
             cursor = self._connection.execute(
                 f"SELECT {', '.join(_COLUMNS)} FROM inputs WHERE status IN ('ready', 'listed') ORDER BY number"
@@ -205,7 +205,7 @@ class Catalogue:
                 yield row
 
     def counts(self) -> list[tuple[tuple[str, ...], int]]:
-        """Return how many rows there are of each combination of ``COUNTED``, by those names in their order."""
+        """Return the number of rows per combination of values of ``COUNTED``."""
         with self._sound():
             rows = self._connection.execute(
                 "SELECT grp, status, licence, source, size_band, count(*) FROM inputs GROUP BY 1, 2, 3, 4, 5"
@@ -219,13 +219,13 @@ class Catalogue:
             raise damaged(self.path, f"a row of group {group!r} and size {band!r}", _DAMAGED)
 
     def causes(self) -> dict[str, int]:
-        """Return how many rows cannot be read, by cause."""
+        """Return the number of unreadable rows by cause."""
         return self._pairs(
             "SELECT cause, count(*) FROM inputs WHERE status = 'unreadable' GROUP BY 1 ORDER BY 2 DESC, 1"
         )
 
     def refused(self) -> list[Refused]:
-        """Return what the lists had that became no row, by list and cause."""
+        """Return the refused entries by list and cause."""
         with self._sound():
             rows = self._connection.execute("SELECT * FROM refused ORDER BY list, count DESC, cause").fetchall()
         return [Refused(*row) for row in rows]
@@ -244,7 +244,7 @@ class Catalogue:
 
 
 def by_each(counts: Iterable[tuple[tuple[str, ...], int]]) -> Mapping[str, dict[str, int]]:
-    """Return how many rows have each value of each of ``COUNTED``."""
+    """Return the number of rows per value of each column of ``COUNTED``."""
     found: dict[str, dict[str, Any]] = {name: {} for name in COUNTED}
     for values, count in counts:
         for name, value in zip(COUNTED, values, strict=True):

@@ -1,1 +1,1 @@
-"""The tables of a data set: Parquet parts below ``index/``, written as a run goes and asked with DuckDB."""
+"""Index of a data set: Parquet tables below ``index/``, written during a run and queried with DuckDB."""

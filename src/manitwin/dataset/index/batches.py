@@ -1,4 +1,4 @@
-"""Batches of point clouds with grasps, for learners."""
+"""Batches of point clouds with grasps for training."""
 
 from __future__ import annotations
 
@@ -33,15 +33,17 @@ def batches(
     framework: Literal["numpy", "torch"],
     seed: int,
 ) -> Iterator[dict[str, Any]]:
-    """Yield the twins (columns ``twin_id, category, gripper``) once, in an order by the seed, as dicts of arrays.
+    """Yield every twin (columns ``twin_id, category, gripper``) once, in an order given by the seed, as batches of arrays.
 
-    ``points (N, P, 3) float32`` m, uniform by area on the visual mesh, in the object frame; ``grasps (N, G, 4, 4) float32``
-    ``gripper_to_object``; ``mask (N, G) bool``, where there is a grasp (elsewhere the identity stands); ``verified
-    (N, G) bool``; ``twin_ids``, a list of N. torch tensors where the framework is torch.
-    Grasps are those of the twin's own gripper, drawn at random where there are more than G, without retired ones, the
-    unfiltered sample and the jittered controls; with ``verified_only`` those alone that held. What is drawn for a twin depends
-    on the seed and its id alone, not on the batch. Raises UsageError for sizes below 1, an unknown framework or one that is
-    not installed, and TwinError for a mesh that cannot be read.
+    A batch has ``points (N, P, 3) float32`` in metres, sampled uniformly by area on the visual mesh, in the object frame;
+    ``grasps (N, G, 4, 4) float32``, transforms ``gripper_to_object``; ``mask (N, G) bool``, true for rows that are grasps (the
+    other rows are the identity); ``verified (N, G) bool``; and ``twin_ids``, a list of N ids. Arrays are torch tensors if the
+    framework is torch.
+
+    Only grasps of the twin's own gripper are used, without retired grasps, the unfiltered sample and the jittered controls. If
+    there are more than G, G are drawn at random. ``verified_only`` keeps only grasps that held in simulation. The draws for a
+    twin depend on the seed and its id alone, not on the batch. Raises UsageError for sizes below 1, an unknown framework or one
+    that is not installed, and TwinError for a mesh that cannot be read.
     """
     for name, value in (("size", size), ("points", points), ("grasps", grasps)):
         if value < 1:
@@ -88,7 +90,7 @@ def _cloud(index: Index, twin_id: str, count: int, rng: np.random.Generator) -> 
 
 
 def _grasps(index: Index, twins: pa.Table, verified_only: bool) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return the poses ``(n, 4, 4)`` and verdicts ``(n,)`` of each twin's grasps by its id."""
+    """Return the poses ``(n, 4, 4)`` and verdicts ``(n,)`` of each twin's grasps, keyed by twin id."""
     gripper_of = dict(zip(twins["twin_id"].to_pylist(), twins["gripper"].to_pylist(), strict=True))
     where = [
         *grasps_of(twins),
@@ -97,7 +99,7 @@ def _grasps(index: Index, twins: pa.Table, verified_only: bool) -> dict[str, tup
         *(["verified"] if verified_only else []),
     ]
     rows = index.select("grasps", where, columns=_COLUMNS)
-    # copies: arrays over Arrow's memory are read-only, which scipy refuses
+    # Copy: arrays over Arrow memory are read-only, and scipy refuses those.
     positions = np.array(rows["position_m"].combine_chunks().flatten()).reshape(-1, 3)
     quaternions = np.array(rows["quaternion_wxyz"].combine_chunks().flatten()).reshape(-1, 4)
     poses = np.tile(np.eye(4), (len(rows), 1, 1))
@@ -111,7 +113,7 @@ def _grasps(index: Index, twins: pa.Table, verified_only: bool) -> dict[str, tup
 def _drawn(
     poses: np.ndarray, verified: np.ndarray, count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return ``count`` grasps, filled up with the identity, where there is one, and which of them held."""
+    """Return up to ``count`` grasps padded with the identity to ``(count, 4, 4)``, the mask of real grasps, and the verdicts."""
     chosen = np.sort(rng.choice(len(poses), count, replace=False)) if len(poses) > count else np.arange(len(poses))
     filled = np.tile(np.eye(4, dtype=np.float32), (count, 1, 1))
     mask, held = np.zeros(count, bool), np.zeros(count, bool)

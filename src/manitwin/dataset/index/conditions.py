@@ -1,4 +1,4 @@
-"""Conditions in SQL: literals are written and what others give is checked, before DuckDB runs it."""
+"""SQL conditions: quote literals, and check user conditions before DuckDB runs them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.dataset.index.tables import TABLES
 from manitwin.errors import UsageError, choose_from
 
 _CONDITION_CHARACTERS = 100_000
-"""Those that this package writes name up to a thousand twins, with 20 characters each."""
+"""Maximum length of a condition. Conditions written by this package list up to a thousand twin ids of 20 characters each."""
 
 EXAMPLE = "\"category = 'mug' and mass_kg < 0.4\""
 _ALONE: dict[str, Any] = {
@@ -20,7 +20,7 @@ _ALONE: dict[str, Any] = {
     **{name: [] for name in ("modifiers", "group_expressions", "group_sets")},
     "aggregate_handling": "STANDARD_HANDLING",
 }
-"""What DuckDB's parser says of a SELECT that has no more than its list of expressions."""
+"""Fields in DuckDB's parse tree of a SELECT that has nothing but its list of expressions."""
 
 _REFUSED = {
     "TABLE_FUNCTION": "functions that make tables",
@@ -31,20 +31,20 @@ _REFUSED = {
 
 
 def sql_texts(values: Iterable[str]) -> str:
-    """Return texts as SQL writes them, with commas between."""
+    """Return texts as comma-separated SQL literals."""
     return ", ".join(map(sql_text, values))
 
 
 def sql_text(value: str) -> str:
-    """Return a text as an SQL literal."""
+    """Return a text as a quoted SQL literal."""
     return "'" + value.replace("'", "''") + "'"
 
 
 def check_condition(connection: duckdb.DuckDBPyConnection, condition: str) -> None:
-    """Raise UsageError for what is not exactly one SQL expression, or reads anything but the tables of the index.
+    """Raise UsageError unless a condition is exactly one SQL expression that reads nothing but the index tables.
 
-    DuckDB's own parser says what it is (``json_serialize_sql``). Subqueries may read the six tables. This is one of two
-    bolts: the connection is locked too.
+    DuckDB's own parser produces the syntax tree that is checked (``json_serialize_sql``). Subqueries may read the six tables.
+    This check is one of two safeguards: the connection is locked as well.
     """
     if len(condition) > _CONDITION_CHARACTERS:
         said = f"{len(condition)} characters, {_CONDITION_CHARACTERS} at most"

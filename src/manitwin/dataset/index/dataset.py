@@ -1,4 +1,4 @@
-"""A data set from Python: filtered, split, iterated and batched, reading nothing before it is asked for."""
+"""Data sets in Python: lazy filtering, splitting, iteration and batching over the index."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.store import RECORD, read_record
 
-if TYPE_CHECKING:  # SAPIEN and meshes are imported when a twin is loaded
+if TYPE_CHECKING:  # SAPIEN and the mesh libraries are imported only when a twin is loaded
     from manitwin.twin.loaded_twin import Twin
 
 _HASH_DIGITS = 16
@@ -25,7 +25,7 @@ _FEW = 1000
 
 
 class Split(NamedTuple):
-    """Three data sets that share no object."""
+    """Train, validation and test data sets that share no object."""
 
     train: Dataset
     val: Dataset
@@ -33,12 +33,11 @@ class Split(NamedTuple):
 
 
 class Dataset(Sequence["Twin"]):
-    """The accepted twins of a data set, a folder or a URL, or those of them that satisfy conditions: a sequence sorted by id.
+    """The accepted twins of a data set (folder or URL), optionally filtered by conditions: a sequence sorted by id.
 
-    Answers come from the index; twins' folders are read when a record or twin is asked for, ``dataset[0]`` loads one, and a
-    slice is a sequence that loads none before it is asked. Raises UsageError where there is no index, and, when it is first
-    asked, for conditions and columns that cannot be used, or take more than ``timeout_s`` or ``memory_gb``; IndexError for a
-    place that there is not.
+    Queries are answered from the index. Twin folders are read only when a record or twin is requested: ``dataset[0]`` loads one
+    twin, a slice loads none until it is indexed. Raises UsageError if there is no index, and at the first query if a condition or
+    column is invalid or exceeds ``timeout_s`` or ``memory_gb``. Raises IndexError for positions out of range.
     """
 
     def __init__(
@@ -59,7 +58,7 @@ class Dataset(Sequence["Twin"]):
 
     @property
     def root(self) -> DatasetRoot:
-        """The folder or URL that it lives at."""
+        """The folder or URL of the data set."""
         return self._index.root
 
     def __repr__(self) -> str:
@@ -85,48 +84,48 @@ class Dataset(Sequence["Twin"]):
         return twin in self.twins()
 
     def index(self, twin: Any, start: int = 0, stop: int | None = None) -> int:
-        """Return the place of a twin, given itself or its id; raises ValueError where it is not among these."""
+        """Return the position of a twin, given as a loaded twin or an id; raises ValueError if it is not in the data set."""
         return self.twins().index(twin, start, stop)
 
     def count(self, twin: Any) -> int:
-        """Return how often a twin, given itself or its id, is among these: once or not at all."""
+        """Return how often a twin, given as a loaded twin or an id, occurs: 1 or 0."""
         return self.twins().count(twin)
 
     def filter(self, where: str) -> Dataset:
-        """Return those that also satisfy an SQL condition on the table ``twins``: ``"category = 'mug' and verified >= 20"``."""
+        """Return the twins that also satisfy an SQL condition on table ``twins``: ``"category = 'mug' and verified >= 20"``."""
         return Dataset(self.root, _index=self._index, _where=(*self._where, where))
 
     def ids(self) -> list[str]:
-        """Return the twins' ids, sorted."""
+        """Return the sorted twin ids."""
         return self.twins().ids()
 
     def records(self) -> Iterator[TwinRecord]:
-        """Yield what twin.json says of each; raises TwinError for one that cannot be read."""
+        """Yield the record (twin.json) of each twin; raises TwinError for one that cannot be read."""
         for twin_id in self.ids():
             with local_files(self.root, twin_id, (RECORD,)) as folder:
                 yield read_record(folder)
 
     def twins(self) -> Twins:
-        """Return them as a sequence, which stays as it is when the index changes; each is loaded when it is asked for."""
+        """Return the twins as a sequence that ignores later changes of the index; each twin is loaded on access."""
         if self._sorted is None or self._sorted[0] is not self._index.parts:
             ids: list[str] = self.table(["twin_id"])["twin_id"].to_pylist()
             self._sorted = (self._index.parts, Twins(self.root, ids))
         return self._sorted[1]
 
     def table(self, columns: Sequence[str] | None = None) -> pa.Table:
-        """Return columns of the table ``twins``, by default all, a row a twin."""
+        """Return columns of the table ``twins`` (all by default), one row per twin."""
         return self._index.select("twins", self._where, columns=columns)
 
     def grasps(self, where: str | None = None, columns: Sequence[str] | None = None) -> pa.Table:
-        """Return rows of the table ``grasps`` of these twins: all of them, or those that satisfy an SQL condition.
+        """Return rows of the table ``grasps`` for these twins, all of them or those that satisfy an SQL condition.
 
-        That is every row of their ``grasps.parquet``: failed ones, other grippers', the unfiltered sample (``proposer`` ends
-        in ``:unfiltered``) and the jittered controls (``:jittered``) too.
+        All rows of ``grasps.parquet`` are included: failed grasps, other grippers' grasps, the unfiltered sample (``proposer``
+        ends in ``:unfiltered``) and the jittered controls (``:jittered``).
         """
         return self._index.select("grasps", [*self._owned(), *([] if where is None else [where])], columns=columns)
 
     def _owned(self) -> list[str]:
-        """Return the conditions on ``grasps`` for these twins: their ids where they are few, else what chooses them."""
+        """Return the conditions on ``grasps`` that select these twins: their ids if they are few, else a subquery."""
         if not self._where:
             return []
         twins = self.table(["twin_id", "category"])
@@ -135,12 +134,12 @@ class Dataset(Sequence["Twin"]):
         return [f"twin_id IN (SELECT twin_id FROM twins {self._index.where(self._where)})"]
 
     def split(self, train: float = 0.8, val: float = 0.1, test: float = 0.1, *, seed: int = 0) -> Split:
-        """Split by object, for good: where a twin belongs depends on the seed and its input's bytes alone.
+        """Split the data set by object into fixed parts: the part of a twin depends only on the seed and the bytes of its input.
 
-        Twins of one input are in one part, and a set that grows leaves every twin where it was. The shares therefore hold on
-        average: of n twins, a part's count is off by some sqrt(n). Shares may add up to less than 1; raises UsageError for
-        others. The hash: the first 64 bits of sha256("<seed>:<source_sha256>"), as a share of 2^64, is below ``train``, or
-        below ``train + val``, ...
+        Twins of one input are in one part, and a growing data set never moves a twin. Shares are therefore met on average: with n
+        twins, the size of a part deviates by about sqrt(n). Shares may sum to less than 1; other invalid shares raise UsageError.
+        The hash is the first 64 bits of sha256("<seed>:<source_sha256>") as a fraction of 2^64: below ``train`` is the training
+        part, below ``train + val`` the validation part, and so on.
         """
         shares = (train, val, test)
         if min(shares) < 0 or sum(shares) > 1 + 1e-9:
@@ -161,9 +160,9 @@ class Dataset(Sequence["Twin"]):
         framework: Literal["numpy", "torch"] = "numpy",
         seed: int = 0,
     ) -> Iterator[dict[str, Any]]:
-        """Yield all twins once, in an order that the seed gives, ``size`` at a time (the last batch may be smaller).
+        """Yield all twins once in an order given by the seed, ``size`` at a time (the last batch may be smaller).
 
-        See ``index.batches`` for what a batch holds and what is raised.
+        See ``index.batches.batches`` for the content of a batch and the errors raised.
         """
         from manitwin.dataset.index.batches import batches
 
@@ -184,7 +183,9 @@ def _restored(index: Index, where: tuple[str, ...]) -> Dataset:
 
 
 def _hash_bound(share: float) -> str:
-    """Return the first hex digits that are not below a share of all; of 1, text that is above all digits."""
+    """Return the smallest hex prefix that is not below a share of the hash range; for a share of 1, text that sorts after all
+    digits.
+    """
     whole = 16**_HASH_DIGITS
     bound = round(min(share, 1.0) * whole)
     return f"{bound:0{_HASH_DIGITS}x}" if bound < whole else "g"

@@ -1,4 +1,4 @@
-"""Twins that may be one object twice: made of the same input, or of one shape and size."""
+"""Near-duplicate twins: twins made of the same input, and pairs of equal shape and size."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from manitwin.dataset.index.query import Index
 from manitwin.dataset.index.tables import DESCRIPTOR_LENGTH
 
 MAX_SHAPE_DISTANCE = 0.02
-"""Of the descriptor, see ``geometry.shape_descriptor``. Over the visual meshes of 25 real objects, the same one described
-again (other samples, turned, scaled by 3.7; five times each) is 0.005 away in the median and at most 0.011; of the 300 pairs
-of different ones the nearest, a mug and a container, are 0.047 apart, the median pair 0.46."""
+"""Limit on the distance of two shape descriptors, see ``geometry.shape_descriptor``. On the visual meshes of 25 real objects, the
+descriptor of the same object (resampled, rotated, scaled by 3.7; five times each) is 0.005 away in the median and at most 0.011.
+Of the 300 pairs of different objects the nearest, a mug and a container, are 0.047 apart, the median pair 0.46.
+"""
 
 MAX_SIZE_RATIO = 1.05
-"""Of the radii of gyration, which are exact: 5 % is more than repair, decimation or rounding change, less than another size."""
+"""Limit on the ratio of the radii of gyration. These are exact: repair, decimation and rounding change them by less than 5 %."""
 
 NEIGHBOURS = 16
-"""A twin looks at no more than so many of its nearest, so that a thousand copies give 16,000 pairs and not half a million."""
+"""Nearest neighbours examined per twin, so that a thousand copies give 16,000 pairs instead of half a million."""
 
 
 @dataclass(frozen=True)
 class NearPair:
-    """Two accepted twins of different inputs with one shape and size, ``first < second``."""
+    """Two accepted twins of different inputs with equal shape and size, ``first < second``."""
 
     first: str
     second: str
@@ -35,7 +36,9 @@ class NearPair:
 
 @dataclass(frozen=True)
 class NearDuplicates:
-    """``same_source``: ids of accepted twins by the input (sha256) that several were made of; ``pairs``, nearest first."""
+    """``same_source`` maps the sha256 of an input to the ids of the accepted twins made of it (two or more); ``pairs`` are
+    nearest first.
+    """
 
     same_source: dict[str, list[str]]
     pairs: list[NearPair]
@@ -44,10 +47,10 @@ class NearDuplicates:
 def near_duplicates(
     index: Index, *, max_shape_distance: float = MAX_SHAPE_DISTANCE, max_size_ratio: float = MAX_SIZE_RATIO
 ) -> NearDuplicates:
-    """Find twins of equal inputs, and pairs of other twins whose shape and size differ by no more than the limits.
+    """Find twins of equal inputs, and pairs of other twins whose shape and size differ by at most the given limits.
 
-    Of twins of one input only the first by id is compared with others. Mirrored objects count as one shape, and colours and
-    labels are not looked at. A tree of the descriptors is searched, so time grows little more than with the number of twins.
+    Of the twins of one input, only the first by id is compared with others. Mirrored objects count as the same shape; colours and
+    labels are ignored. The descriptors are searched with a k-d tree, so time grows only slightly faster than the number of twins.
     """
     rows = index.select("twins", columns=["twin_id", "source_sha256", "radius_of_gyration_m", "shape_descriptor"])
     same_source: dict[str, list[str]] = {}
@@ -76,14 +79,14 @@ def near_duplicates(
 def _near(
     shapes: np.ndarray, log_sizes: np.ndarray, max_distance: float, max_log_ratio: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return indices of pairs within both limits, their distances and size ratios, nearest first.
+    """Return the index pairs within both limits, their distances and size ratios, nearest first.
 
-    The tree holds shape and size in units of their limits: a pair within both is within the square root of two.
+    The tree holds shape and size in units of their limits, so a pair within both limits is at most sqrt(2) apart.
     """
     if len(shapes) < 2:
         return np.empty(0, int), np.empty(0, int), np.empty(0), np.empty(0)
     scaled = np.column_stack([log_sizes / max_log_ratio, shapes.astype(np.float64) / max_distance])
-    count = min(NEIGHBOURS + 1, len(scaled))  # each is its own nearest
+    count = min(NEIGHBOURS + 1, len(scaled))  # each twin is its own nearest neighbour
     _, near = cKDTree(scaled).query(scaled, k=count, distance_upper_bound=np.sqrt(2) * (1 + 1e-9))
     own = np.repeat(np.arange(len(scaled)), count)
     other = near.ravel()

@@ -1,4 +1,4 @@
-"""The list of the files that make up an index: ``index/parts.json``, replaced whole, so that an index changes at one moment."""
+"""List of the files that make up an index: ``index/parts.json``, replaced atomically, so that an index changes at one instant."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from manitwin.twin.store import canonical_json
 INDEX = "index"
 PARTS = f"{INDEX}/parts.json"
 MAX_ROWS = 1 << 40
-"""Of a table, and of its files: they are read a row group at a time."""
+"""Maximum number of rows of a table and of each of its files, which are read one row group at a time."""
 
 
 @dataclass(frozen=True)
 class IndexPart:
-    """Rows of some twins, in one file a table.
+    """The rows of some twins, one file per table.
 
-    ``rows`` are those of each table. All ids lie between ``first`` and ``last``, which other parts may overlap; which they
-    are stands in the columns ``twin_id`` of ``twins`` and ``rejections``.
+    ``rows`` is the number of rows per table. All twin ids lie between ``first`` and ``last``; the ranges of parts may overlap.
+    The columns ``twin_id`` of ``twins`` and ``rejections`` say which ids a part has.
     """
 
     name: str
@@ -37,36 +37,36 @@ class IndexPart:
     last: str
 
     def file(self, table: str) -> str:
-        """Return the name of a table's file below the data set's root."""
+        """Return the name of a table's file, relative to the data set's root."""
         return f"{INDEX}/{table}/{self.name}.parquet"
 
     @property
     def twins(self) -> int:
-        """The number of its twins, accepted and rejected."""
+        """The number of twins, accepted and rejected."""
         return self.rows["twins"] + self.rows["rejections"]
 
 
 @dataclass(frozen=True)
 class PartList:
-    """The parts that count, by their first id; ``next`` numbers the next one: no name is used twice."""
+    """The valid parts, sorted by first id. ``next`` is the number of the next part; part names are never reused."""
 
     parts: tuple[IndexPart, ...] = ()
     next: int = 0
     schema_id: str = field(default=SCHEMA_ID)
 
     def rows(self, table: str) -> int:
-        """Return how many rows a table has."""
+        """Return the number of rows of a table."""
         return sum(part.rows[table] for part in self.parts)
 
     def write(self, root: DatasetRoot) -> None:
-        """Replace the list of a data set: from here on its index is this one."""
+        """Replace the list of a data set, which makes this index the valid one."""
         root.write_bytes(PARTS, canonical_json(asdict(self)).encode())
 
 
 def read_part_list(root: DatasetRoot) -> PartList | None:
-    """Return the parts of a data set's index, or None where it has no index.
+    """Return the parts of a data set's index, or None if it has no index.
 
-    Raises UsageError for an index of other tables than this version's.
+    Raises UsageError if the index is unreadable or has the tables of another version.
     """
     remedy = remedy_of(root)
     try:
@@ -87,14 +87,14 @@ def read_part_list(root: DatasetRoot) -> PartList | None:
 
 
 def no_index(root: DatasetRoot) -> UsageError:
-    """Return the error of a place without an index: it can be made where there are twins, and only there."""
+    """Return the error for a place without an index; it suggests ``manitwin index`` only if the place has twins."""
     if not root.has_twins:
         return no_dataset(root)
     return UsageError(f"{root.url}: has no index; run manitwin index {root.url}")
 
 
 def no_dataset(root: DatasetRoot) -> UsageError:
-    """Return the error of a place without twins: of a build that has not ended one yet, or of no build."""
+    """Return the error for a place without twins, either a build that has not finished any or a place that is no data set."""
     if root.exists(LEDGER):
         return UsageError(f"{root.url}: no twin is finished yet; manitwin status {root.url} shows the progress")
     return UsageError(
@@ -103,17 +103,17 @@ def no_dataset(root: DatasetRoot) -> UsageError:
 
 
 def remedy_of(root: DatasetRoot) -> str:
-    """Return what mends a damaged index."""
+    """Return the command that repairs a damaged index."""
     return f"run manitwin check {root.url}"
 
 
 def refusal_of(root: DatasetRoot) -> Refusal:
-    """Return what makes the error of a file that is none: its own remedy gives way to that of an index."""
+    """Return a factory of errors for malformed files whose own remedy is replaced by that of the index."""
     return with_remedy(UsageError, remedy_of(root))
 
 
 def require_files(root: DatasetRoot, parts: PartList) -> None:
-    """Raise UsageError where a part's file is none that can be read whole; those of a URL are left to who reads them."""
+    """Raise UsageError if a part's file cannot be read completely. Files at a URL are left to their reader."""
     if root.local is None:
         return
     for part in parts.parts:
@@ -128,7 +128,7 @@ def require_files(root: DatasetRoot, parts: PartList) -> None:
 
 
 def require_regular(root: DatasetRoot, parts: PartList) -> None:
-    """Raise UsageError where a part's file is no regular one below the root; one that has gone is left to who reads it."""
+    """Raise UsageError if a part's file is not a regular file below the root. Missing files are left to their reader."""
     for part in parts.parts if root.local is not None else ():
         for table in TABLES:
             path = Path(root.full(part.file(table)))
@@ -153,12 +153,12 @@ def _count(said: Any) -> int:
 
 
 def in_order_of_twins(parts: Iterable[IndexPart]) -> tuple[IndexPart, ...]:
-    """Return parts as the list keeps them."""
+    """Return parts in the order of the list."""
     return tuple(sorted(parts, key=lambda part: (part.first, part.last, part.name)))
 
 
 def sweep(root: DatasetRoot, keep: PartList) -> list[str]:
-    """Remove the files of the index that are in no part: what a crash left, and what has been replaced. Returns their names."""
+    """Remove index files that belong to no part (left by a crash, or replaced) and return their names."""
     wanted = {PARTS, *(part.file(table) for part in keep.parts for table in TABLES)}
     stale = [name for name in root.names_below(INDEX) if name not in wanted]
     for name in stale:

@@ -1,9 +1,9 @@
-"""Write an index as a run goes, and merge its parts: every twin is in exactly one part, so that readers need no joins.
+"""Incremental writing of the index, and merging of its parts. Every twin is in exactly one part, so readers need no joins.
 
-A part is written file by file and counts from when ``parts.json`` names it; a crash at any moment leaves the old list or the
-new one. Files that no list names are ignored, and removed by the next write. There is one writer at a time: the calls come
-from one worker process after the other, never two at once, and nothing here locks. Readers may read meanwhile: the files of
-the list before stay until the next write.
+A part is written file by file and becomes valid once ``parts.json`` lists it. A crash at any time leaves either the old or the
+new list. Unlisted files are ignored and removed by the next write. There is a single writer: worker processes call one after the
+other, never concurrently, so nothing is locked here. Readers may read during a write: the files of the previous list stay until
+the next write.
 """
 
 from __future__ import annotations
@@ -37,31 +37,33 @@ from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import RECORD
 
 MERGE_WIDTH = 8
-"""So many parts of one order of size are merged into one: one of n twins is written log8(n) times, and readers open few files."""
+"""Number of parts of similar size that are merged into one. A twin among n is then written log8(n) times, and readers open few
+files.
+"""
 
 PART_ROWS = 1 << 20
-"""Grasps of a merged part, about: 60 MB on disk, 0.6 GB of memory to sort."""
+"""Approximate number of grasps of a merged part: 60 MB on disk, 0.6 GB of memory to sort."""
 
 LOG = logging.getLogger("manitwin.index")
 
 Files = Mapping[str, Sequence[str]]
-"""The files to read of each table, as the file system names them."""
+"""Files of each table, as named by the file system."""
 
 
 class IndexTables:
-    """The index as the tables that a run keeps of its twins."""
+    """The index tables that a run maintains for its twins."""
 
     def add(self, root: DatasetRoot, ids: Sequence[str]) -> None:
-        """Index finished twins, new or built again, as one more part; those whose folder is gone are taken out."""
+        """Index finished twins, new or rebuilt, as one more part, and remove twins whose folder is gone."""
         there = [twin_id for twin_id in ids if root.exists(f"{root.twin_name(twin_id)}/{RECORD}")]
         write_part(root, there, gone=[twin_id for twin_id in ids if twin_id not in there])
 
     def merge(self, root: DatasetRoot) -> None:
-        """Merge all parts into few large ones."""
+        """Merge all parts into a few large ones."""
         compact(root)
 
     def heal(self, root: DatasetRoot) -> bool:
-        """Remove an index that cannot be read; returns True where there is none, so that all twins are to be added."""
+        """Remove an unreadable index; return True if there is no index (any more), so that all twins must be added."""
         try:
             parts = read_part_list(root)
             if parts is None:
@@ -75,11 +77,11 @@ class IndexTables:
 
 
 def write_part(root: DatasetRoot, ids: Iterable[str], *, gone: Iterable[str] = ()) -> IndexPart | None:
-    """Index finished twins, new or built again, as one more part; returns it, or None where no ids are given.
+    """Index finished twins, new or rebuilt, as one more part and return it; return None if no ids are given.
 
-    A twin that an older part has is taken out of it, and so are those that are ``gone``: that part is written again, under
-    another name. Where that makes eight parts of about one size, they become one, and the part returned may be in that already.
-    Raises TwinError for a folder that cannot be read; the index then is what it was.
+    Twins that an older part has, and those in ``gone``, are removed from that part, which is rewritten under another name. Eight
+    parts of similar size are then merged into one, so the returned part may already be part of a larger one. Raises TwinError for
+    a folder that cannot be read; the index is then unchanged.
     """
     wanted = sorted(set(ids))
     changed = sorted({*wanted, *gone})
@@ -99,7 +101,7 @@ def write_part(root: DatasetRoot, ids: Iterable[str], *, gone: Iterable[str] = (
 
 
 def compact(root: DatasetRoot) -> list[IndexPart]:
-    """Merge all parts into few large ones that do not overlap; returns them. An index that is so already stays as it is."""
+    """Merge all parts into a few large ones that do not overlap and return them; a compact index stays unchanged."""
     before = read_part_list(root) or PartList()
     sweep(root, before)
     if _is_compact(before):
@@ -112,7 +114,7 @@ def compact(root: DatasetRoot) -> list[IndexPart]:
 
 
 def indexed_twins(root: DatasetRoot) -> dict[str, str]:
-    """Return the revision of every twin in the index by its id; empty where there is no index."""
+    """Return a dict from the id of every twin in the index to its revision; empty if there is no index."""
     parts = read_part_list(root) or PartList()
     require_files(root, parts)
     files, fs = files_of(root, parts.parts), file_system(root)
@@ -124,7 +126,7 @@ def indexed_twins(root: DatasetRoot) -> dict[str, str]:
 
 
 def rows_of_twins(root: DatasetRoot, ids: Iterable[str]) -> Iterator[dict[str, pa.Table]]:
-    """Yield the rows of finished twins of a data set, one twin after the other; raises TwinError."""
+    """Yield the rows of finished twins of a data set, one twin at a time; raises TwinError."""
     for twin_id in ids:
         with local_files(root, twin_id, FILES) as folder:
             yield rows_of(folder)
@@ -136,14 +138,14 @@ def _joined(rows: Iterator[dict[str, pa.Table]]) -> dict[str, pa.Table]:
 
 
 def _is_compact(parts: PartList) -> bool:
-    """Tell whether the parts do not overlap and are as few as a merge would make them."""
+    """Return whether the parts do not overlap and are as few as a merge would make them."""
     ordered = parts.parts
     apart = all(one.last < other.first for one, other in pairwise(ordered))
     return apart and len(ordered) <= max(1, -(-parts.rows("grasps") // PART_ROWS))
 
 
 def _alike(parts: Sequence[IndexPart]) -> list[IndexPart]:
-    """Return parts of one order of size, where there are enough of them to merge; full ones are left alone."""
+    """Return parts of similar size if there are enough of them to merge; full parts are left alone."""
     by_size: dict[int, list[IndexPart]] = {}
     for part in parts:
         if part.rows["grasps"] < PART_ROWS // 2:
@@ -152,7 +154,7 @@ def _alike(parts: Sequence[IndexPart]) -> list[IndexPart]:
 
 
 class _Writer:
-    """The parts of an index while they change; nothing counts before ``finish``."""
+    """The parts of an index while they change; nothing becomes valid before ``finish``."""
 
     def __init__(self, root: DatasetRoot, before: PartList):
         require_files(root, before)
@@ -160,20 +162,20 @@ class _Writer:
         self.parts, self.next = list(before.parts), before.next
 
     def parts_with(self, ids: list[str]) -> list[IndexPart]:
-        """Return the parts that have any of the ids (sorted)."""
+        """Return the parts that contain any of the sorted ids."""
         near = [part for part in self.parts if part.first <= ids[-1] and ids[0] <= part.last] if ids else []
         wanted = set(ids)
         return [part for part in near if not wanted.isdisjoint(twin_ids(files_of(self.root, [part]), self.fs).tolist())]
 
     def add(self, rows: dict[str, pa.Table]) -> IndexPart:
-        """Write rows as a part of their own; returns it."""
+        """Write rows as a new part and return it."""
         part = write_rows(self.root, self.next, rows)
         self.parts.append(part)
         self.next += 1
         return part
 
     def replace(self, parts: list[IndexPart], without: frozenset[str] = frozenset()) -> None:
-        """Write the rows of parts again, merged, without those of some twins."""
+        """Rewrite the rows of parts, merged, without the rows of some twins."""
         grasps = sum(part.rows["grasps"] for part in parts)
         for rows in merged(files_of(self.root, parts), self.fs, grasps, without=without):
             self.add(rows)
@@ -187,18 +189,18 @@ class _Writer:
 
 
 def file_system(root: DatasetRoot) -> Any:
-    """Return a data set's file system as pyarrow takes it."""
+    """Return a data set's file system as a pyarrow file system."""
     return LocalFileSystem() if root.local is not None else PyFileSystem(FSSpecHandler(root.fs))
 
 
 def files_of(root: DatasetRoot, parts: Sequence[IndexPart]) -> Files:
-    """Return the files of parts by table."""
+    """Return the files of parts, keyed by table."""
     return {table: [root.full(part.file(table)) for part in parts] for table in TABLES}
 
 
 def read_rows(files: Files, table: str, fs: Any, *, columns: list[str] | None = None, where: Any = None) -> pa.Table:
-    """Return the rows of a table's files that satisfy a pyarrow expression."""
-    import pyarrow.dataset as pads  # brings pandas, and few that import this module read rows
+    """Return the rows of a table's files that satisfy a pyarrow expression; raises UsageError if they cannot be read."""
+    import pyarrow.dataset as pads  # imports pandas; few users of this module read rows
 
     try:
         source = pads.dataset(list(files[table]), schema=TABLES[table], format="parquet", filesystem=fs)
@@ -209,7 +211,7 @@ def read_rows(files: Files, table: str, fs: Any, *, columns: list[str] | None = 
 
 
 def twin_ids(files: Files, fs: Any) -> np.ndarray:
-    """Return the ids of all twins in the files, sorted."""
+    """Return the sorted ids of all twins in the files."""
     both = [read_rows(files, table, fs, columns=["twin_id"])["twin_id"] for table in ("twins", "rejections")]
     return np.sort(np.concatenate([column.to_numpy(zero_copy_only=False).astype(str) for column in both]))
 
@@ -217,9 +219,9 @@ def twin_ids(files: Files, fs: Any) -> np.ndarray:
 def merged(
     files: Files, fs: Any, grasps: int, *, without: frozenset[str] = frozenset()
 ) -> Iterator[dict[str, pa.Table]]:
-    """Yield the rows of all files but those of the twins ``without``, by table, in ranges of ids that do not overlap.
+    """Yield the rows of all files, except those of the twins ``without``, by table, in id ranges that do not overlap.
 
-    ``grasps`` is how many grasps there are: it decides how many ranges there will be.
+    ``grasps`` is the total number of grasps and determines the number of ranges.
     """
     ids = twin_ids(files, fs)
     ids = ids[~np.isin(ids, sorted(without))]
@@ -234,7 +236,7 @@ def merged(
 
 
 def write_rows(root: DatasetRoot, number: int, rows: Mapping[str, pa.Table]) -> IndexPart:
-    """Write the tables of a part, each file whole; the part counts from when the list of parts names it."""
+    """Write the tables of a part, each file atomically; the part becomes valid once the list of parts names it."""
     ids = [twin_id for table in ("twins", "rejections") for twin_id in rows[table]["twin_id"].to_pylist()]
     part = IndexPart(f"{number:06d}", {table: len(rows[table]) for table in TABLES}, min(ids), max(ids))
     for table in TABLES:

@@ -1,4 +1,4 @@
-"""Ask an index: DuckDB over the Parquet files of its parts, read-only and locked, with conditions that are checked first."""
+"""Queries on an index: DuckDB over the Parquet files of its parts, read-only and locked, with conditions checked beforehand."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from manitwin.twin.dataset_root import DatasetRoot
 
 _Answer = TypeVar("_Answer")
 _FILE_IS_GONE = (duckdb.IOException, duckdb.PermissionException, FileNotFoundError)
-"""What a file of the list raises that is not there any more: DuckDB then looks for a folder of that name, and may not."""
+"""Errors for a listed file that no longer exists: DuckDB then looks for a folder of that name, which it may not read."""
 
 _OF_THE_CONDITION = (
     duckdb.BinderException,
@@ -36,19 +36,19 @@ _OF_THE_CONDITION = (
     duckdb.CatalogException,
     duckdb.ConversionException,
 )
-"""What a damaged file never raises; of anything else it is asked whether the files are whole."""
+"""Errors that a damaged file never causes. After any other DuckDB error, the files are checked for damage."""
 
 TIMEOUT_S = 60.0
 MEMORY_GB = 4.0
-"""Of DuckDB (2^30 bytes), which writes nothing to the disk instead. All grasps of 100,000 twins, sorted, take more."""
+"""Memory limit of DuckDB (1 GB = 2^30 bytes), which never spills to disk here. Sorting all grasps of 100,000 twins needs more."""
 
 
 class Index:
-    """The six tables of a data set's index, as they are when first asked; reads the files, holds nothing.
+    """The six tables of a data set's index as of the first query; reads files on demand and keeps no rows in memory.
 
-    A condition is one SQL expression over a table's columns (DuckDB's dialect); subqueries may read the other tables. It
-    cannot write, and can read nothing else. Raises UsageError where there is no index, and for conditions and columns that
-    cannot be used, or not within the limits of time and memory.
+    A condition is one SQL expression over a table's columns (DuckDB dialect); subqueries may read the other tables. It cannot
+    write, nor read anything else. Raises UsageError if there is no index, if conditions or columns are invalid, and if a query
+    exceeds the limits of time (``timeout_s``) or memory (``memory_gb``).
     """
 
     def __init__(self, root: DatasetRoot | str | Path, *, timeout_s: float = TIMEOUT_S, memory_gb: float = MEMORY_GB):
@@ -62,7 +62,7 @@ class Index:
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(type(self), timeout_s=self.timeout_s, memory_gb=self.memory_gb), (
             self.root,
-        )  # opened anew there
+        )  # the receiving process opens its own connection
 
     @property
     def parts(self) -> PartList:
@@ -71,7 +71,7 @@ class Index:
 
     @property
     def connection(self) -> duckdb.DuckDBPyConnection:
-        """DuckDB with a view for each table, for SQL of one's own; it can read the index and nothing else."""
+        """A DuckDB connection with one view per table for custom SQL; it can read the index and nothing else."""
         return self._opened()[1]
 
     def select(
@@ -102,31 +102,31 @@ class Index:
             raise self._damaged(error) from error
 
     def count(self, table: str = "twins", where: Sequence[str] | str = ()) -> int:
-        """Return how many rows satisfy all conditions."""
+        """Return the number of rows that satisfy all conditions."""
         _schema(table)
         sql = f"SELECT count(*) FROM {table} {self.where(where)}"
         return int(self._ask(table, lambda connection: connection.sql(sql).fetchall())[0][0])
 
     def where(self, where: Sequence[str] | str) -> str:
-        """Return the WHERE clause of all conditions, each of them checked; raises UsageError."""
+        """Return the WHERE clause of all conditions after checking each; raises UsageError."""
         conditions = [where] if isinstance(where, str) else list(where)
         for condition in conditions:
             check_condition(self.connection, condition)
-        # a line of its own: a comment at a condition's end must not swallow the bracket
+        # On its own line: a comment at the end of a condition must not swallow the bracket.
         return "WHERE " + " AND ".join(f"(\n{condition}\n)" for condition in conditions) if conditions else ""
 
     def _ask(self, table: str, question: Callable[[duckdb.DuckDBPyConnection], _Answer]) -> _Answer:
         try:
             return self._limited(table, question)
         except _FILE_IS_GONE:
-            self._open = None  # a merge has replaced the files since: the new list names the new ones
+            self._open = None  # a merge has replaced the files; the new list names the new ones
         try:
             return self._limited(table, question)
         except _FILE_IS_GONE as error:
             raise self._damaged(error) from error
 
     def _limited(self, table: str, question: Callable[[duckdb.DuckDBPyConnection], _Answer]) -> _Answer:
-        """Ask within the limits of time and memory; a signal interrupts it as well."""
+        """Run a query within the limits of time and memory; a signal interrupts it as well."""
         connection = self.connection
         timer = threading.Timer(self.timeout_s, connection.interrupt)
         timer.daemon = True
@@ -151,15 +151,15 @@ class Index:
             if not isinstance(error, _OF_THE_CONDITION):
                 require_files(self.root, read_part_list(self.root) or PartList())
             raise UsageError(_explained(error, table)) from error
-        except UnicodeDecodeError as error:  # names in a damaged file that are no text, in DuckDB's own message
+        except UnicodeDecodeError as error:  # undecodable names from a damaged file in DuckDB's message
             raise self._damaged(error) from error
         except RuntimeError as error:
-            if "interrupt" in str(error).lower():  # DuckDB's words for what a signal's handler raised
+            if "interrupt" in str(error).lower():  # DuckDB's message when a signal handler raised
                 raise KeyboardInterrupt from error
             raise
         finally:
             timer.cancel()
-            timer.join()  # a thread that outlives the program holds the connection, and DuckDB's binding prints that it leaked
+            timer.join()  # a thread that outlives the program would hold the connection, and DuckDB's binding reports a leak
 
     def _opened(self) -> tuple[PartList, duckdb.DuckDBPyConnection]:
         if self._open is None:
@@ -180,7 +180,7 @@ class Index:
 
 
 def _connect(root: DatasetRoot, parts: PartList, memory_gb: float) -> duckdb.DuckDBPyConnection:
-    """Return a DuckDB that has a view for each table, reads the files of these parts alone and writes none."""
+    """Return a DuckDB connection with one view per table that can read only the files of these parts and write nothing."""
     connection = duckdb.connect(
         config={
             "autoinstall_known_extensions": False,
@@ -206,15 +206,15 @@ def _connect(root: DatasetRoot, parts: PartList, memory_gb: float) -> duckdb.Duc
 
 
 def location(root: DatasetRoot, name: str) -> str:
-    """Return a file's place as DuckDB names it."""
+    """Return the path of a file as DuckDB names it."""
     full = root.full(name)
     return full if root.local is not None else str(root.fs.unstrip_protocol(full))
 
 
 def grasps_of(twins: pa.Table) -> list[str]:
-    """Return the conditions on ``grasps`` for given twins (columns ``twin_id, category``).
+    """Return the conditions on ``grasps`` that select given twins (columns ``twin_id, category``).
 
-    With their categories, as these grasps lie together in the files: few row groups are read.
+    The category is included because grasps of a category are contiguous in the files, so that few row groups are read.
     """
     return [f"{name} IN ({sql_texts(sorted(set(twins[name].to_pylist())))})" for name in ("twin_id", "category")]
 
@@ -226,7 +226,7 @@ def _schema(table: str) -> pa.Schema:
 
 
 def _explained(error: duckdb.Error, table: str) -> str:
-    """Describe what is wrong with a condition in one line; for an unknown column, name the nearest and all there are."""
+    """Describe an invalid condition in one line; for an unknown column, name the nearest and all valid ones."""
     unknown = re.search(r'Referenced column "(.+?)" not found', str(error))
     if unknown:
         name = unknown.group(1)

@@ -1,4 +1,4 @@
-"""Write the whole index again from the twins' folders alone, in several processes."""
+"""Parallel rebuild of the whole index from the twin folders."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from manitwin.errors import TwinError
 from manitwin.twin.dataset_root import DatasetRoot
 
 CHUNK = 64
-"""Twins of a task: some seconds of work, some thousand rows."""
+"""Twins per task: a few seconds of work and a few thousand rows."""
 
 
 @dataclass(frozen=True)
 class Rebuilt:
-    """The parts of a new index, and a line for every twin's folder that could not be read and is not in it."""
+    """The parts of a new index, and one line for each twin folder that could not be read and is therefore not indexed."""
 
     parts: list[IndexPart]
     unreadable: list[str]
 
     def rows(self, table: str) -> int:
-        """Return how many rows a table has."""
+        """Return the number of rows of a table."""
         return sum(part.rows[table] for part in self.parts)
 
 
 @dataclass(frozen=True)
 class _Read:
-    """The answer of a task, whose rows are in files."""
+    """Result of a task; its rows are in files."""
 
     twins: int
     grasps: int
@@ -50,11 +50,10 @@ def rebuild(
     on_start: Callable[[int], None] = lambda twins: None,
     on_read: Callable[[int], None] = lambda twins: None,
 ) -> Rebuilt:
-    """Replace a data set's index by one made of its folders alone: the same rows as one that was written as the run went.
+    """Replace a data set's index by one made from its folders, with the same rows as an index written during a run.
 
-    ``on_start`` is told how many twins there are, ``on_read`` how many more of them have been read. The old index stays until
-    the new one is whole. Raises UsageError where there are no twins, and TwinError where a worker process dies: nothing has
-    changed then.
+    ``on_start`` receives the number of twins, ``on_read`` how many more have been read. The old index stays valid until the new
+    one is complete. Raises UsageError if there are no twins, and TwinError if a worker process dies; nothing has changed then.
     """
     if not root.has_twins:
         raise no_dataset(root)
@@ -80,7 +79,7 @@ def rebuild(
 
 
 def _first_unused_number(root: DatasetRoot) -> int:
-    """Return a number above those of all files: the old list may be lost, or of another version."""
+    """Return a number above those of all index files, since the old list may be lost or of another version."""
     stems = (PurePosixPath(name).stem for name in root.names_below(INDEX))
     return max((int(stem) + 1 for stem in stems if stem.isdecimal()), default=0)
 

@@ -1,4 +1,4 @@
-"""A twin's folder as rows of the index's tables."""
+"""Rows of the index tables from a twin's folder."""
 
 from __future__ import annotations
 
@@ -25,15 +25,17 @@ from manitwin.twin.store import RECORD, REMEDY, RUN, read_record
 
 VISUAL, GRASPS = "visual.glb", "grasps.parquet"
 FILES = (RECORD, RUN, SHAPE, VISUAL, GRASPS)
-"""All that is read of a twin's folder; a rejected one has the first two alone. The mesh is read where nothing says its shape."""
+"""All files read from a twin's folder. A rejected twin has only the first two. The mesh is read only if the shape file is
+missing.
+"""
 
 _Row = dict[str, Any]
 
 
 def rows_of(folder: Path) -> dict[str, pa.Table]:
-    """Return the rows of a twin by table: those of ``twins`` or of ``rejections``, and all others.
+    """Return the rows of a twin by table: one row in ``twins`` or ``rejections``, and the rows of the other tables.
 
-    Pure: equal files give equal rows. Raises TwinError for a folder that is no finished twin or lacks a file.
+    Equal files give equal rows. Raises TwinError for a folder that is not a finished twin or lacks a file.
     """
     record = read_record(folder)
     costs = _costs(folder)
@@ -175,7 +177,7 @@ def _placements(record: TwinRecord) -> list[_Row]:
 
 
 def _grasps(path: Path, record: TwinRecord) -> pa.Table:
-    """Return grasps.parquet with the twin's id and category and the number of each row, best first as in the file."""
+    """Return grasps.parquet with the twin's id, category and the row number prepended, best grasp first as in the file."""
     table = read_grasp_table(path)
     count = len(table)
     leading = [

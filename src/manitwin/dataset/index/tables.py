@@ -1,10 +1,10 @@
-"""The six tables of an index: their columns, the order of their rows, and how they are written.
+"""The six tables of an index: columns, row order and Parquet encoding.
 
-SI units, object frame, quaternions wxyz. Every twin is in exactly one of ``twins`` (accepted) and ``rejections``, and has
-rows in the other tables by its ``twin_id``. ``grasps`` repeats its twin's ``category``, so that what is asked of all mugs'
-grasps needs no join: written once a twin, it takes next to no space.
+SI units, object frame, quaternions wxyz. Every twin is in exactly one of ``twins`` (accepted) and ``rejections``, and has rows in
+the other tables, keyed by ``twin_id``. ``grasps`` repeats the ``category`` of its twin, so that queries such as all grasps of
+mugs need no join; the column compresses to almost nothing.
 
-Imports neither meshes nor simulation, so that a query answers at once.
+This module imports neither mesh nor simulation code, so that queries start quickly.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _COST = _named(_REAL, "seconds cpu_seconds cost_usd")
 _ORIGIN = _named(_TEXT, "twin_id revision name kind source_sha256 license")
 
 DESCRIPTOR_LENGTH = 66
-"""Numbers of ``geometry.shape_descriptor``."""
+"""Length of ``geometry.shape_descriptor``."""
 
 TABLES: dict[str, pa.Schema] = {
     "twins": _schema(
@@ -69,7 +69,7 @@ TABLES: dict[str, pa.Schema] = {
     "grasps": _schema(
         **_named(_TEXT, "twin_id category"),
         number=_COUNT,
-        # from here on as in a twin's grasps.parquet
+        # From here on the columns are those of a twin's grasps.parquet.
         **_named(_TEXT, "grasp_id gripper"),
         position_m=pa.list_(_REAL, 3),
         quaternion_wxyz=pa.list_(_REAL, 4),
@@ -110,29 +110,30 @@ ORDER: dict[str, tuple[str, ...]] = {
     "rejections": ("twin_id",),
     "stages": ("twin_id", "position"),
 }
-"""The order in which answers give rows; no two rows are equal in it."""
+"""Sort order of query results, unique per row."""
 
 _IN_FILES = {**ORDER, "grasps": ("category", *ORDER["grasps"])}
-"""The order in files. A category's rows lie together: of all mugs' grasps one row group in 60 is read, not each of them
-(0.06 s for 0.5 s); one twin's are still found by the ids of its part and row groups (0.03 s)."""
+"""Sort order in files. Rows of a category are contiguous: a query for all grasps of mugs reads one row group in 60 instead of all
+(0.06 s instead of 0.5 s). The rows of a single twin are still found by the id ranges of parts and row groups (0.03 s).
+"""
 
 _ROW_GROUP = 1 << 16
-"""Rows of a row group; half or twice as many are as quick (benchmarks/index.py)."""
+"""Rows per row group; half or twice as many are equally fast (benchmarks/index.py)."""
 
 _UNLIKE = ("twin_id", "revision", "source_sha256", "caption")
-"""Texts of ``twins`` that differ in every row, where a dictionary only costs."""
+"""Text columns of ``twins`` whose values are unique per row, where dictionary encoding only adds cost."""
 
 SCHEMA_ID = hashlib.sha256(
     repr([(n, [(f.name, str(f.type)) for f in s]) for n, s in TABLES.items()]).encode()
 ).hexdigest()
-"""Changes with any table, name or type: parts of another one are not read but written again."""
+"""Changes with any table, column name or type. Parts with another id are not read but rewritten."""
 
 
 def parquet(table: pa.Table) -> bytes:
     """Return a table of the index as a Parquet file; equal tables give equal bytes.
 
-    All are compressed by zstd but ``twins``: it is small and wide, and a few of its rows are read out of all row groups, with
-    lz4 in half the time (0.07 CPU-s for 0.14 of 100,000 twins, 54 MB for 45).
+    Tables are compressed with zstd, except ``twins``, which uses lz4: it is small and wide, queries read a few of its rows out of
+    all row groups, and lz4 takes half the time (0.07 instead of 0.14 CPU-s for 100,000 twins, 54 instead of 45 MB).
     """
     twins = table.schema == TABLES["twins"]
     words = [field.name for field in table.schema if field.type == _TEXT and not (twins and field.name in _UNLIKE)]
@@ -143,6 +144,6 @@ def parquet(table: pa.Table) -> bytes:
 
 
 def joined(name: str, tables: list[pa.Table]) -> pa.Table:
-    """Return rows of one table put together, in the order that files have."""
+    """Return the concatenated rows of one table in file order."""
     rows = pa.concat_tables([TABLES[name].empty_table(), *tables])
     return rows.sort_by([(column, "ascending") for column in _IN_FILES[name]]).combine_chunks()

@@ -1,4 +1,4 @@
-"""Twins of a data set as a sequence: each is loaded when it is asked for."""
+"""Lazily loaded sequence of a data set's twins."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ _SHOWN = 3
 
 
 class Twins(Sequence["Twin"]):
-    """Loaded twins, by their place: a slice is another such sequence, and reads no folder.
+    """Twins by position, loaded on access; a slice is another such sequence and reads no folder.
 
-    A twin is loaded anew each time that it is asked for; of a URL, its folder is a copy, which is removed with it. ``in``,
-    ``index`` and ``count`` take a twin or its id, and load none. Raises IndexError for a place that there is not, KeyError for
-    an id that is not among these, TwinError for a folder that cannot be read.
+    A twin is loaded anew on every access. From a URL, its folder is a temporary copy that is removed with the twin object.
+    ``in``, ``index`` and ``count`` take a twin or its id and load nothing. Raises IndexError for positions out of range, KeyError
+    for an id that is not in the sequence, and TwinError for a folder that cannot be read.
     """
 
     def __init__(self, root: DatasetRoot, ids: Sequence[str]):
         self._root, self._ids = root, ids
 
     def ids(self) -> list[str]:
-        """Return the twins' ids, in this order."""
+        """Return the twin ids in sequence order."""
         return list(self._ids)
 
     def __repr__(self) -> str:
@@ -70,21 +70,21 @@ class Twins(Sequence["Twin"]):
         return id_of(twin) in self._ids
 
     def index(self, twin: Any, start: int = 0, stop: int | None = None) -> int:
-        """Return the first place of a twin, given itself or its id; raises ValueError where it is not among these."""
+        """Return the first position of a twin, given as a loaded twin or an id; raises ValueError if it is not present."""
         return self._ids.index(id_of(twin), *slice(start, stop).indices(len(self._ids))[:2])
 
     def count(self, twin: Any) -> int:
-        """Return how often a twin, given itself or its id, is among these."""
+        """Return how often a twin, given as a loaded twin or an id, occurs."""
         return self._ids.count(id_of(twin))
 
 
 def id_of(twin: Any) -> str | None:
-    """Return the id of a twin that is given itself or by its id; None for anything else."""
+    """Return the id of a twin that is given as a loaded twin or an id; None for anything else."""
     return twin if isinstance(twin, str) else getattr(getattr(twin, "record", None), "twin_id", None)
 
 
 def load_twin(root: DatasetRoot, twin_id: str) -> Twin:
-    """Load a twin of a data set; of a URL, from a copy that is removed with it. Raises TwinError."""
+    """Load a twin of a data set; from a URL, load a copy that is removed with the twin object. Raises TwinError."""
     from manitwin.twin.loaded_twin import Twin
 
     if root.local is not None:
@@ -102,7 +102,7 @@ def load_twin(root: DatasetRoot, twin_id: str) -> Twin:
 
 @contextmanager
 def local_files(root: DatasetRoot, twin_id: str, files: Iterable[str]) -> Iterator[Path]:
-    """Give a folder with those of a twin's files that are there: its own, or for a URL a copy that ends with the context."""
+    """Provide a local folder with the existing ones of a twin's files: its own folder or, for a URL, a temporary copy."""
     name = root.twin_name(twin_id)
     if root.local is not None:
         yield root.local / name
@@ -111,6 +111,6 @@ def local_files(root: DatasetRoot, twin_id: str, files: Iterable[str]) -> Iterat
         folder = Path(scratch) / twin_id
         folder.mkdir()
         for file in files:
-            if root.exists(f"{name}/{file}"):  # who reads the folder says what is missing
+            if root.exists(f"{name}/{file}"):  # the reader of the folder reports missing files
                 root.fetch_file(f"{name}/{file}", folder / file)
         yield folder

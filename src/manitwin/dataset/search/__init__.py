@@ -1,1 +1,1 @@
-"""Search a data set by words and by a picture, over embeddings that are kept beside its index."""
+"""Search of a data set by words and by picture, with embeddings stored beside its index."""

@@ -1,4 +1,4 @@
-"""What a question asks for: words that are wanted, words that are not, and whether small or large things come first."""
+"""Parsing of search questions: wanted words, unwanted words, and whether small or large objects rank first."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ SPELLINGS = {
     "gray": "grey", "aluminum": "aluminium", "colored": "coloured", "golden": "gold", "wooden": "wood", "metallic": "metal",
     "violet": "purple", "crimson": "red", "navy": "blue", "cloth": "fabric",
 }  # fmt: skip
-"""Other spellings of words that descriptions use."""
+"""Spelling variants and synonyms mapped to the words that descriptions use."""
 PLURALS = (
     ("ives", "ife"), ("aves", "af"), ("ies", "y"), ("oes", "o"), ("sses", "ss"), ("xes", "x"), ("zes", "z"), ("ches", "ch"),
     ("shes", "sh"), ("us", "us"), ("ss", "ss"), ("s", ""),
 )  # fmt: skip
-"""Endings of plurals and what stands for each in the singular; of several that fit the first counts."""
+"""Plural endings and their singular endings; the first match applies."""
 _WORD = re.compile(r"[^\W_]+")
 
 
 @dataclass(frozen=True)
 class Question:
-    """``wanted``: of each word that is looked for, the forms of it that descriptions have; ``unwanted`` alike.
+    """``wanted`` maps each searched word to its forms that occur in descriptions; ``unwanted`` likewise for excluded words.
 
-    ``larger_first``: whether large things come first, or small ones; None where the question says neither.
+    ``larger_first`` is True if large objects rank first, False for small ones, and None if the question does not say.
     """
 
     wanted: dict[str, frozenset[str]]
@@ -45,9 +45,10 @@ class Question:
 
     @classmethod
     def of(cls, text: str, vocabulary: Collection[str], pairs: dict[str, tuple[str, str]]) -> Question:
-        """Read a question; ``vocabulary`` has the words of all descriptions, ``pairs`` those side by side, by both in one.
+        """Parse a question. ``vocabulary`` has the words of all descriptions, ``pairs`` maps joined adjacent words to the two
+        words.
 
-        Raises UsageError where nothing is looked for.
+        Raises UsageError if the question has no word to search for.
         """
         wanted, unwanted, negated = list[str](), list[str](), False
         for word in _joined(_all_words(text), vocabulary, pairs):
@@ -58,7 +59,7 @@ class Question:
                 negated = False
         sizes = [word for word in wanted if word in SMALL or word in LARGE]
         if len(sizes) == len(wanted) or len({word in LARGE for word in sizes}) != 1:
-            sizes = []  # alone it is a word as others are: descriptions say of what is large that it is
+            sizes = []  # a size word alone is searched like any other word, since descriptions contain size words
         told = [word for word in wanted if word not in sizes]
         if not told:
             why = "contains only excluded words" if unwanted else "has no word to search for"
@@ -71,7 +72,7 @@ class Question:
 
 
 def words(text: str) -> list[str]:
-    """Return the words of a text that mean something, in the singular and in one spelling."""
+    """Return the meaningful words of a text, singular and in normalized spelling."""
     return [word for word in _all_words(text) if word not in IGNORED]
 
 
@@ -81,7 +82,7 @@ def _all_words(text: str) -> list[str]:
 
 
 def _joined(asked: list[str], vocabulary: Collection[str], pairs: dict[str, tuple[str, str]]) -> list[str]:
-    """Write compounds as descriptions do: ``hour glass`` is an hourglass, and ``wineglass`` a wine glass."""
+    """Write compounds as descriptions do: ``hour glass`` becomes hourglass, ``wineglass`` becomes wine glass."""
     found, place = list[str](), 0
     while place < len(asked):
         both = "".join(asked[place : place + 2])
@@ -96,7 +97,7 @@ def _joined(asked: list[str], vocabulary: Collection[str], pairs: dict[str, tupl
 
 
 def _forms(word: str, vocabulary: Collection[str]) -> frozenset[str]:
-    """Return a word, and of its forms with and without -ing those that are in the vocabulary: ``drink`` and ``drinking``."""
+    """Return a word and those of its forms with and without -ing that are in the vocabulary: ``drink`` and ``drinking``."""
     stems = {word}
     if word.endswith("ing") and len(word) > len("ring") + 1:
         stem = word.removesuffix("ing")

@@ -1,4 +1,4 @@
-"""Find twins of a data set by words or by a picture."""
+"""Search twins of a data set by words or by a picture."""
 
 from __future__ import annotations
 
@@ -35,16 +35,17 @@ COLUMNS = (
     "longest_m",
 )
 BEST_VIEWS = 3
-"""A twin is as like a picture as the mean of its three most alike views: one alone may be so by chance."""
+"""Number of best views whose mean similarity is a twin's score; a single view may match by chance."""
 FUSION = 60
-"""Added to ranks that are joined (Cormack, Clarke and Büttcher 2009, "Reciprocal rank fusion")."""
+"""Constant of reciprocal rank fusion, added to each rank (Cormack, Clarke and Büttcher 2009, "Reciprocal rank fusion")."""
 
 
 @dataclass(frozen=True)
 class Hit:
-    """A twin that was found; ``score`` orders the hits of one search, and is comparable to no other's.
+    """A search result. ``score`` orders the hits of one search and is not comparable across searches.
 
-    ``matched``: of words, the fields that have each; None of a picture, and of a twin that was found by its embedding alone.
+    ``matched`` maps each question word to the fields that contain it; None for picture searches and for twins found by their
+    embedding alone.
     """
 
     twin_id: str
@@ -56,10 +57,10 @@ class Hit:
 
 
 def search_words(root: DatasetRoot, question: str, *, limit: int, embedder: TextEmbedder | None = None) -> list[Hit]:
-    """Return at most ``limit`` twins, the best first: those that have words of the question, by BM25.
+    """Return at most ``limit`` twins that contain words of the question, best first, ranked by BM25.
 
-    With an ``embedder`` all twins are ranked by the cosine of their captions' vectors too, which are kept, and both ranks are
-    joined. Raises UsageError without an index or words.
+    With an ``embedder``, all twins are also ranked by the cosine similarity of their caption vectors, which are stored, and both
+    rankings are fused. Raises UsageError without an index or words.
     """
     rows = _rows(root)
     by_words = rank_by_words(question, [described(row) for row in rows], [row["longest_m"] for row in rows])
@@ -74,7 +75,7 @@ def search_words(root: DatasetRoot, question: str, *, limit: int, embedder: Text
 
 
 def words_of_no_twin(root: DatasetRoot, question: str) -> dict[str, list[str]]:
-    """Return the words of a question that no twin of a data set has, each with those of twins that are spelt nearly so."""
+    """Return the question words that occur in no twin of a data set, each with similarly spelt words that do."""
     return unknown_words(question, [described(row) for row in _rows(root)])
 
 
@@ -85,9 +86,9 @@ def search_picture(
     limit: int,
     on_twin: Callable[[str], None] = lambda twin_id: None,
 ) -> tuple[list[Hit], Found]:
-    """Return the twins that look most like what ``pixels (H, W, 3 or 4) uint8`` show, and how that was told from behind it.
+    """Return the twins that look most like ``pixels (H, W, 3 or 4) uint8``, and how the foreground was segmented.
 
-    Raises UsageError without an index, for a data set at a URL, and for a picture in which nothing is.
+    Raises UsageError without an index, for a data set at a URL, and for a picture without a foreground.
     """
     from manitwin.dataset.search.twin_looks import twin_looks
     from manitwin.models.embedders.foreground import foreground
@@ -106,12 +107,12 @@ def search_picture(
 
 
 def likeness(look: np.ndarray, views: np.ndarray) -> float:
-    """Return the mean of the three largest dot products of a look ``(D,)`` with those of a twin's views ``(V, D)``."""
+    """Return the mean of the three largest dot products of a feature vector ``(D,)`` with those of a twin's views ``(V, D)``."""
     return float(np.sort(views.astype(np.float64) @ look.astype(np.float64))[-BEST_VIEWS:].mean())
 
 
 def text_vectors(root: DatasetRoot, rows: Sequence[dict[str, Any]], embedder: TextEmbedder) -> np.ndarray:
-    """Return the vectors ``(N, D)`` of the twins' descriptions; those that are not kept are asked for and kept."""
+    """Return the vectors ``(N, D)`` of the twins' descriptions; missing or outdated ones are computed and stored."""
     store = VectorStore(root, f"texts-{hashlib.sha256(embedder.identity.encode()).hexdigest()[:16]}")
     texts = [f"{row['category']}: {row['caption']}" for row in rows]
     digests = [sha256_of_json([embedder.identity, text]) for text in texts]
@@ -140,7 +141,7 @@ def _joined_ranks(*orders: list[int]) -> dict[int, float]:
 
 
 def _rows(root: DatasetRoot) -> list[dict[str, Any]]:
-    """Return the twins of an index, each with the labels of its functional points as its ``parts``."""
+    """Return the twins of an index, each with the labels of its functional points as ``parts``."""
     index = Index(root)
     rows: list[dict[str, Any]] = index.select("twins", columns=COLUMNS).to_pylist()
     labels = defaultdict[str, list[str]](list)

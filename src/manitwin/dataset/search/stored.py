@@ -1,4 +1,4 @@
-"""Vectors of twins kept in the data set: ``search/<space>/<2 hex>/<twin_id>.parquet``, each made once for what it is made of."""
+"""Storage of twin embeddings in the data set, ``search/<space>/<2 hex>/<twin_id>.parquet``, each computed once per content."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ REMEDY = "remove the folder search/ of the data set"
 
 @dataclass(frozen=True)
 class Stored:
-    """The vectors ``(V, D) float32`` of a twin, of its ``revision``; ``content`` is the digest of what they are made of."""
+    """The vectors ``(V, D) float32`` of a twin at ``revision``; ``content`` is the digest of the data they were computed from."""
 
     revision: str
     content: str
@@ -28,20 +28,20 @@ class Stored:
 
 
 class VectorStore:
-    """The vectors of one space (an embedder and its version), ``length`` numbers each; they are kept in half precision.
+    """The vectors of one space (an embedder and its version), ``length`` numbers each, stored in half precision.
 
-    A file is written whole or not at all, so that a run that was cut off goes on where it stopped.
+    Files are written atomically, so that an interrupted run can continue.
     """
 
     def __init__(self, root: DatasetRoot, space: str, length: int | None = None):
         self._root, self.space, self._length = root, space, length
 
     def file(self, twin_id: str) -> str:
-        """Return the name of a twin's file below the root."""
+        """Return the name of a twin's file relative to the root."""
         return f"{FOLDER}/{self.space}/{twin_id[:2]}/{twin_id}.parquet"
 
     def read(self, twin_id: str) -> Stored | None:
-        """Return what is kept of a twin; None where there is nothing, or nothing that can be read: it is made again."""
+        """Return the stored vectors of a twin; None if they are missing or unreadable and must be recomputed."""
         try:
             content = self._root.read_bytes(self.file(twin_id), limit_bytes=MAX_STORED_BYTES)
             table = read_parquet(io.BytesIO(content), TwinError, schema=_SCHEMA, remedy=REMEDY, name=self.file(twin_id))
@@ -57,7 +57,7 @@ class VectorStore:
         return Stored(rows["revision"][0], rows["content"][0], vectors)
 
     def write(self, twin_id: str, stored: Stored) -> Stored:
-        """Keep a twin's vectors; return them as they are read again. Equal ones give equal bytes."""
+        """Store a twin's vectors and return them rounded as stored. Equal vectors give equal bytes."""
         half = stored.vectors.astype(np.float16).astype(np.float32)
         count = len(half)
         table = pa.table(

@@ -1,4 +1,4 @@
-"""What twins look like from around, in the ways in which they rest, embedded once and kept."""
+"""Appearance vectors of twins rendered from all sides in their placements, computed once and stored."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from manitwin.twin.store import sha256_of_json
 
 PLACEMENTS, AROUND = 3, 12
 ELEVATIONS_DEG = (15.0, 35.0, 60.0)
-"""As one sees a table from a chair, standing, and from above."""
+"""Camera elevations: seated at a table, standing, and from above."""
 PICTURE_PX, FOV_Y_DEG = 160, 30.0
 SPACE = f"pictures-{VERSION}"
 
@@ -30,10 +30,10 @@ def twin_looks(
     revisions: dict[str, str],
     on_twin: Callable[[str], None] = lambda twin_id: None,
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the looks ``(V, 1536) float32`` of twins by id (``revisions``: what the index says of each), made where none fit.
+    """Yield id and appearance vectors ``(V, 1536) float32`` of each twin of ``revisions`` (id to revision in the index).
 
-    Those kept fit as long as the twin's surface and placements are the same. ``on_twin`` hears of each that is drawn: a second
-    of CPU time. Raises UsageError for a data set behind a URL.
+    Stored vectors stay valid while the twin's surface and placements are unchanged; others are computed. ``on_twin`` is called
+    for each twin that is rendered, which takes a second of CPU time. Raises UsageError for a data set at a URL.
     """
     if root.local is None:
         raise UsageError(
@@ -56,13 +56,13 @@ def twin_looks(
 
 
 def content_digest(twin: Twin) -> str:
-    """Return the digest of what a twin's looks are made of: its surface, and how it rests."""
+    """Return the digest of the data that determines a twin's appearance vectors: its surface and its placements."""
     resting = [list(placement.quaternion_wxyz) for placement in _placements(twin)]
     return sha256_of_json([SPACE, twin.record.files["visual.glb"], resting])
 
 
 def looks_around(twin: Twin) -> np.ndarray:
-    """Return the looks ``(V, 1536)`` of a twin from 12 sides in each of its three likeliest placements that stayed."""
+    """Return the appearance vectors ``(V, 1536)`` of a twin from 12 sides in each of its three most likely settled placements."""
     points = np.concatenate([part.vertices for part in twin.visual])
     cameras = [
         camera
@@ -78,7 +78,7 @@ def _placements(twin: Twin) -> list[Placement]:
 
 
 def _around(points_m: np.ndarray, object_to_plane: np.ndarray, number: int) -> Iterator[Camera]:
-    """Yield cameras around an object at rest, in the object frame; other placements are seen from between these sides."""
+    """Yield cameras around an object at rest, in the object frame. The azimuths of other placements are offset between these."""
     resting, back = points_m @ object_to_plane.T, np.eye(4)
     back[:3, :3] = object_to_plane.T
     for place in range(AROUND):

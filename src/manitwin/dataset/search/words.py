@@ -1,4 +1,4 @@
-"""Rank twins by words: BM25 over the fields that describe them, with the priors' other names of their categories."""
+"""Ranking of twins by words: BM25 over their descriptive fields and the aliases of their categories in the priors."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ WEIGHTS = {
     "parts": 0.5,
     "caption": 0.5,
 }
-"""What a word in each field counts: what a thing is before what colour it has, and that before what it is made of."""
+"""Weight of a word in each field: category above colour, colour above material."""
 UNWANTED_IN = ("category", "aliases", "name", "color", "material", "kind", "parts")
-"""The fields in which a word that is not wanted leaves a twin out."""
+"""Fields in which an unwanted word excludes a twin."""
 KINDS = {
     "kitchen": "kitchen kitchenware", "tableware": "tableware kitchen", "tools": "tool", "food": "food", "toys": "toy",
     "electronics": "electronics electronic device", "office": "office stationery", "household": "household",
     "containers": "container", "furniture": "furniture",
 }  # fmt: skip
-"""Words for all things of a table of the priors."""
+"""Words for all objects of a domain of the priors."""
 SATURATION, LENGTH_SHARE = 1.2, 0.75
 """k1 and b of BM25, as Robertson and Zaragoza 2009 give them, section 3.5."""
 SIZE_SHARE = 0.25
-"""By how much more the smallest (largest) of a category counts where small (large) ones are asked for."""
+"""Largest relative bonus of the smallest (largest) twin of a category if small (large) ones are requested."""
 MOST_NEAR, NEARLY = 3, 0.75
 """How many words that are spelt nearly as an unknown one are told, and how like it they are (difflib's ratio)."""
 _NOT_A_COLOR = re.compile(r"\(.*?\)|unknown color")
@@ -50,7 +50,7 @@ _COLORS = frozenset(
 
 @dataclass(frozen=True)
 class WordHit:
-    """A twin's place in ``rows``, its score, and by which words of the question it was found in which fields."""
+    """A twin's position in the input list, its score, and the fields that matched per question word."""
 
     place: int
     score: float
@@ -58,9 +58,9 @@ class WordHit:
 
 
 def described(row: Mapping[str, object]) -> dict[str, str]:
-    """Return the texts by field of a row of the index's table ``twins``; aliases are those of the category's prior.
+    """Return the texts by field of a row of the index table ``twins``; the aliases are those of the category's prior.
 
-    Colours in aliases say nothing of this twin: a red apple is one of the names of apples.
+    Colour words are removed from the aliases: the alias "red apple" does not mean that this twin is red.
     """
     texts = {field: str(row.get(field) or "") for field in WEIGHTS}
     texts["color"] = _NOT_A_COLOR.sub(" ", texts["color"])
@@ -76,11 +76,11 @@ def described(row: Mapping[str, object]) -> dict[str, str]:
 def rank_by_words(
     question: str, texts: list[dict[str, str]], longest_m: Sequence[float] | None = None
 ) -> list[WordHit]:
-    """Return those of twins (``described``) that have a word of the question, the best first; equal ones as they came.
+    """Return the twins (texts from ``described``) that contain a word of the question, best first; ties keep the input order.
 
-    BM25F: the words of all fields make one document, each counted by its field's weight and length (Robertson, Zaragoza and
-    Taylor 2004, "Simple BM25 extension to multiple weighted fields"). A twin that has an unwanted word is left out; where small
-    or large ones are asked for, ``longest_m`` orders those of a category. Raises UsageError for a question without such words.
+    BM25F: the words of all fields form one document, each weighted by its field's weight and length (Robertson, Zaragoza and
+    Taylor 2004, "Simple BM25 extension to multiple weighted fields"). Twins with an unwanted word are left out. If small or large
+    objects are requested, ``longest_m`` ranks those of one category. Raises UsageError for a question without words.
     """
     counted = [{field: Counter(words(text)) for field, text in each.items()} for each in texts]
     asked = Question.of(
@@ -114,7 +114,7 @@ def rank_by_words(
 
 
 def unknown_words(question: str, texts: list[dict[str, str]]) -> dict[str, list[str]]:
-    """Return the words of a question that no twin (``described``) has in any form, each with those of twins spelt nearly so.
+    """Return the question words that no twin (texts from ``described``) has in any form, with similarly spelt words that occur.
 
     Raises UsageError for a question without words.
     """
@@ -127,7 +127,7 @@ def unknown_words(question: str, texts: list[dict[str, str]]) -> dict[str, list[
 def _by_size(
     hits: list[WordHit], categories: list[str], longest_m: Sequence[float], larger_first: bool
 ) -> list[WordHit]:
-    """Raise the scores of hits by how many of their category they are larger (smaller) than."""
+    """Increase the scores of hits by the share of hits of their category that they are larger (smaller) than."""
     weighed = []
     for hit in hits:
         others = [each.place for each in hits if categories[each.place] == categories[hit.place] and each is not hit]
@@ -138,7 +138,7 @@ def _by_size(
 
 
 def _pairs(texts: list[dict[str, str]]) -> dict[str, tuple[str, str]]:
-    """Return the words that stand side by side in what twins are called, by both written as one."""
+    """Return the adjacent words in categories and names, keyed by both words joined."""
     named = (words(each[field]) for each in texts for field in ("category", "name"))
     return {"".join(pair): pair for found in named for pair in pairwise(found)}
 
