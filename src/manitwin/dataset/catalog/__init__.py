@@ -1,1 +1,1 @@
-"""Catalogues: pictures, point clouds, captions and categories of twins, for retrieval, classification and captioning."""
+"""Catalogues of twins for retrieval, classification and captioning: pictures, point clouds, captions and categories."""

@@ -1,4 +1,4 @@
-"""Which twins belong together in a split: those of one input, and those of nearly one shape and size."""
+"""Leakage-free splits: twins of one input, or of nearly equal shape and size, form a group that is never divided."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SPLITS = (("train", 0.8), ("val", 0.1), ("test", 0.1))
 
 
 def groups_of(twin_ids: Sequence[str], near: NearDuplicates) -> dict[str, str]:
-    """Return the group of each twin, called by its first id: what is linked by an input or a near shape is in one group."""
+    """Return the group of each twin, named by its smallest id: the connected components of equal inputs and near duplicates."""
     first = {twin_id: twin_id for twin_id in twin_ids}
 
     def root(twin_id: str) -> str:
@@ -30,7 +30,7 @@ def groups_of(twin_ids: Sequence[str], near: NearDuplicates) -> dict[str, str]:
 
 
 def split_of(group: str) -> str:
-    """Return the split of a group by the digest of its name: all views, clouds and captions of its twins are in it."""
+    """Return the split of a group, drawn from the digest of its name. All views, clouds and captions of its twins follow it."""
     place = int.from_bytes(hashlib.sha256(group.encode()).digest()[:8], "big") / 2**64
     for name, share in SPLITS:
         if place < share:

@@ -1,4 +1,4 @@
-"""A twin's surface as points with normals and colours, and as pictures from around."""
+"""Sampled surface points of a twin with normals and colours, and views from all sides."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from manitwin.render.renderer import BACKDROP, shared_renderer
 from manitwin.twin.loaded_twin import Twin
 
 POINTS = (10_000, 8_192)
-"""OpenShape's and ULIP's numbers; the smaller cloud is the beginning of the larger one."""
+"""Cloud sizes of OpenShape and ULIP; the smaller cloud is a prefix of the larger one."""
 VIEWS, STEP_DEG = 30, 12
-"""ULIP's pictures: one every 12 degrees."""
+"""ULIP's views: one every 12 degrees of azimuth."""
 ELEVATIONS_DEG = (30.0, 10.0, 50.0)
 FOV_Y_DEG = 30.0
 
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """``points_m (N, 3)``, outward unit ``normals (N, 3)`` and ``rgb (N, 3) uint8`` sRGB base colours, object frame."""
+    """``points_m (N, 3)``, outward unit ``normals (N, 3)`` and base colours ``rgb (N, 3) uint8`` sRGB, in the object frame."""
 
     points_m: np.ndarray
     normals: np.ndarray
@@ -33,7 +33,9 @@ class SurfacePoints:
 
 @dataclass(frozen=True)
 class View:
-    """A picture ``rgb (H, W, 3) uint8``, the distance along the viewing axis ``depth_m (H, W)``, 0 beside it, and its camera."""
+    """A picture ``rgb (H, W, 3) uint8``, its camera, and the depth along the optical axis ``depth_m (H, W)``, 0 for
+    background.
+    """
 
     azimuth_deg: int
     camera: Camera
@@ -42,7 +44,7 @@ class View:
 
 
 def surface_points(twin: Twin, count: int, seed: int) -> SurfacePoints:
-    """Sample points evenly by area over a twin's visual surface, each with the base colour there."""
+    """Sample points uniformly by area on a twin's visual surface, each with its normal and base colour."""
     rng = np.random.default_rng([seed, zlib.crc32(twin.record.twin_id.encode())])
     vertices, faces = trimesh.util.append_faces(
         [part.vertices for part in twin.visual], [part.faces for part in twin.visual]
@@ -59,12 +61,12 @@ def surface_points(twin: Twin, count: int, seed: int) -> SurfacePoints:
 
 
 def _colors(part: trimesh.Trimesh, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the base colours ``(N, 3) uint8`` sRGB of a visual part at points on its faces."""
+    """Return the base colours ``(N, 3) uint8`` sRGB at points on faces of a visual part."""
     return np.rint(255 * base_colors_at(part, faces, points)).astype(np.uint8)
 
 
 def views_around(twin: Twin, size_px: int) -> list[View]:
-    """Draw a standing twin every 12 degrees, from 30, 10 and 50 degrees above the horizon in turn."""
+    """Render a standing twin every 12 degrees of azimuth, at elevations of 30, 10 and 50 degrees in turn."""
     points = np.concatenate([part.vertices for part in twin.visual])
     cameras = [
         framing_camera(

@@ -1,4 +1,4 @@
-"""Write a catalogue of a data set's twins as training codes for retrieval, classification and captioning read it."""
+"""Write a catalogue of a data set's twins in the formats that retrieval, classification and captioning code reads."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ SHOWN_TWINS, SHOWN_VIEWS = 24, (1, 11, 22)
 
 @dataclass(frozen=True)
 class Catalog:
-    """What was written: twins by split, pictures, categories, groups of more than one twin; twins left out and why."""
+    """Summary of a written catalogue: twins per split, pictures, categories, groups of several twins, and twins left out with
+    reasons.
+    """
 
     twins: dict[str, int]
     pictures: int
@@ -49,11 +51,11 @@ def write_catalog(
     seed: int = 0,
     on_twin: Callable[[str], None] = lambda twin_id: None,
 ) -> Catalog:
-    """Write pictures, clouds, captions and lists of all accepted twins of a local data set below ``out``, whole or not at all.
+    """Write pictures, clouds, captions and lists of all accepted twins of a local data set to ``out``, atomically.
 
-    docs/catalog.md says what lies where. The same arguments give the same bytes. A twin whose files cannot be read is left out.
-    Raises UsageError for a data set at a URL, without an index or without twins, and an ``out`` that is not empty; TwinError
-    where no twin can be read.
+    docs/catalog.md describes the layout. Equal arguments give equal bytes. A twin whose files cannot be read is left out. Raises
+    UsageError for a data set at a URL, without an index or without twins, and for an ``out`` that is not empty; TwinError if no
+    twin can be read.
     """
     from manitwin.formats.output_folder import new_folder
 
@@ -104,7 +106,7 @@ def write_catalog(
 def _row(twin: Twin, group: str) -> dict[str, Any]:
     record = twin.record
     language = record.language
-    assert language is not None  # the schema lets no accepted twin lack it
+    assert language is not None  # the schema requires it of accepted twins
     return {
         "twin_id": record.twin_id,
         "revision": record.revision,
@@ -125,14 +127,15 @@ def _attributes(language: Language) -> dict[str, str]:
 
 
 def taxonomy_of(category: str) -> str:
-    """Return a category as a name of files without hyphens and dots, at which ULIP's readers cut names."""
+    """Return a category as a file name without hyphens and dots, at which ULIP's readers split names."""
     return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in category) or "object"
 
 
 def _write_clouds(folder: Path, row: dict[str, Any], points: SurfacePoints) -> None:
-    """Write ``clouds/``, all of a twin's points in metres, OpenShape's dictionary of 10,000, and ULIP's array of 8,192.
+    """Write a twin's points in metres to ``clouds/``, OpenShape's dictionary of 10,000 points, and ULIP's array of 8,192.
 
-    OpenShape's axes are those of its Objaverse clouds: +Y up, which its loader turns by itself where ``y_up`` is set.
+    The OpenShape and ULIP clouds use the axes of OpenShape's Objaverse clouds, +Y up; OpenShape's loader rotates them if ``y_up``
+    is set.
     """
     arrays = {
         "xyz_m": points.points_m.astype(np.float32),
@@ -140,7 +143,7 @@ def _write_clouds(folder: Path, row: dict[str, Any], points: SurfacePoints) -> N
         "rgb": points.rgb,
     }
     stream = io.BytesIO()
-    np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]  # numpy's stub takes names for its own flags
+    np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]  # type: ignore[arg-type] # numpy's stub takes names for its own flags
     row["cloud"] = f"clouds/{row['twin_id']}.npz"
     _write(folder / row["cloud"], stream.getvalue())
     y_up = points.points_m[:, [0, 2, 1]] * [1, 1, -1]
@@ -168,7 +171,9 @@ def _npy(array: np.ndarray) -> bytes:
 
 
 def _write_pictures(folder: Path, row: dict[str, Any], views: list[View]) -> None:
-    """Write ULIP's pictures: ``<name>_r_<degrees>.png``, and depth as 8 bits, near white, far black, nothing black."""
+    """Write ULIP's views, ``<name>_r_<degrees>.png``, and 8-bit depth images: near is white, far is darker,
+    background is black.
+    """
     name = f"{row['taxonomy']}-{row['twin_id']}"
     row["pictures"] = []
     for view in views:
@@ -215,7 +220,7 @@ def _openshape(row: dict[str, Any]) -> dict[str, str]:
 
 
 def _coco_captions(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return COCO's captions: every picture of a twin has the sentences of the twin."""
+    """Return COCO captions in which every view of a twin has the captions of the twin."""
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
     for row in rows:

@@ -1,1 +1,1 @@
-"""A data set as others download it: WebDataset shards by category, Parquet tables and the hub's dataset card."""
+"""Publication of a data set: WebDataset shards by category, Parquet tables and a Hugging Face dataset card."""

@@ -1,4 +1,4 @@
-"""README.md of a published data set: the hub's dataset card, with examples of loading it and the frames of its numbers."""
+"""Dataset card (README.md) of a published data set, with loading examples and the definitions of its frames."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _TABLES = {
 
 @dataclass(frozen=True)
 class CardFacts:
-    """The facts that a card tells: rows of the published ``twins`` table, counts of the other tables' rows, the shards' bytes.
+    """Input of a card: rows of the published ``twins`` table, row counts of the other tables, and shard sizes in bytes.
 
-    ``pictures`` are names of files below the publication.
+    ``pictures`` are file names relative to the publication.
     """
 
     name: str
@@ -42,7 +42,7 @@ class CardFacts:
 
 
 def dataset_card(facts: CardFacts) -> str:
-    """Return README.md: front matter that the hub and ``datasets`` read, statistics, how to load, frames and licences."""
+    """Return README.md: front matter for the hub and ``datasets``, statistics, loading examples, frames and licences."""
     verified = sum(twin["verified"] for twin in facts.twins)
     licences = [twin["license"] for twin in facts.twins]
     configs = {name: f"index/{name}-*.parquet" for name in _TABLES}
@@ -85,7 +85,7 @@ def dataset_card(facts: CardFacts) -> str:
 
 
 def size(count: int) -> str:
-    """Return bytes for a person: ``3.2 GB`` (powers of 1000, as the hub counts)."""
+    """Return a byte count as text such as ``3.2 GB`` (powers of 1000, as on the hub)."""
     value, units = float(count), ["B", "kB", "MB", "GB", "TB"]
     while value >= 1000 and len(units) > 1:
         value /= 1000
@@ -94,16 +94,19 @@ def size(count: int) -> str:
 
 
 def size_category(count: int) -> str:
-    """Return the hub's word for how many rows a data set has."""
+    """Return the hub's size category of a number of rows."""
     return next((word for word, limit in _SIZES if count < limit), "10M<n<100M")
 
 
 def front_matter(
     name: str, licences: Iterable[str], rows: int, tags: Sequence[str], configs: Mapping[str, str]
 ) -> list[str]:
-    """Return the lines of a card's front matter; ``configs`` are paths of tables by their name, the default one first."""
+    """Return the lines of a card's YAML front matter. ``configs`` maps table names to paths; the first is the default."""
     fields = {"pretty_name": name, **hub_license(licences)}
-    lines = ["---", *(f"{key}: {json.dumps(value)}" for key, value in fields.items())]  # a JSON string is a YAML string
+    lines = [
+        "---",
+        *(f"{key}: {json.dumps(value)}" for key, value in fields.items()),
+    ]  # a JSON string is a valid YAML string
     lines += ["size_categories:", f"- {json.dumps(size_category(rows))}"]
     lines += ["task_categories:", "- robotics", "tags:", *[f"- {each}" for each in tags], "configs:"]
     for number, (config, path) in enumerate(configs.items()):
@@ -119,7 +122,7 @@ def _table_rows(facts: CardFacts) -> list[list[str]]:
 
 
 def licence_section(twins: Sequence[Mapping[str, Any]], terms: str) -> list[str]:
-    """Return the lines of the card's section on licences: their table, the terms, and whether authors are unknown."""
+    """Return the card's section on licences: their table, the terms, and a warning if authors are unknown."""
     lines = ["## Licences and attribution", "", *licence_lines(twins), "", terms]
     missing = len(without_attribution(twins))
     if missing:
@@ -202,7 +205,7 @@ SI units everywhere: metres, kilograms, seconds, newtons, radians. Quaternions a
 
 
 def usage_text(facts: CardFacts) -> list[str]:
-    """Return the lines of both sections, with one of the data set's own categories and shards in the examples."""
+    """Return the usage sections of the card, with a category and shard of this data set in the examples."""
     example = max(facts.twins, key=lambda twin: (twin["verified"], twin["twin_id"]))
-    category = re.sub(r"[^\w .-]", "", str(example["category"]))  # it stands in code
+    category = re.sub(r"[^\w .-]", "", str(example["category"]))  # the category is inserted into code
     return _TEXT.format(category=category, shard=example["shard"]).splitlines()

@@ -1,4 +1,4 @@
-"""The numbers on the dataset card, all of them from the published ``twins`` table."""
+"""Statistics on the dataset card, computed from the published ``twins`` table."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ COLUMNS = (
     *("held_in_second_engine_share", "functional_points", "grasp_points", "placements", "watertight", "failed_checks"),
     *("mass_source", "longest_m", "mass_kg", "hulls"),
 )
-"""What the card takes of the table ``twins``."""
+"""Columns of the table ``twins`` that the card uses."""
 
 Rows = Sequence[Mapping[str, Any]]
 
 
 def total_lines(twins: Rows) -> list[str]:
-    """Return two tables: the totals, and how size, mass and grasps are spread."""
+    """Return two tables: totals, and the distributions of size, mass and grasps."""
     simulated, verified = (sum(twin[key] for twin in twins) for key in ("simulated", "verified"))
     opinions = [twin["held_in_second_engine_share"] for twin in twins]
     totals = [
@@ -40,7 +40,7 @@ def total_lines(twins: Rows) -> list[str]:
         ["stable poses", f"{sum(twin['placements'] for twin in twins):,}"],
         ["watertight", f"{sum(twin['watertight'] for twin in twins):,}"],
         ["with a failed quality check", f"{sum(bool(twin['failed_checks']) for twin in twins):,}"],
-        # prior:mug and prior:bowl are both prior
+        # Only the part before the colon counts: prior:mug and prior:bowl are both prior.
         ["where the masses come from", _counted(twin["mass_source"].partition(":")[0] for twin in twins)],
     ]
     spread = [
@@ -55,7 +55,7 @@ def total_lines(twins: Rows) -> list[str]:
 
 
 def category_lines(twins: Rows) -> list[str]:
-    """Return a table of the largest categories, and how many more there are."""
+    """Return a table of the largest categories, with a line on the number of other ones."""
     count = Counter(twin["category"] for twin in twins)
     verified: Counter[str] = Counter()
     for twin in twins:

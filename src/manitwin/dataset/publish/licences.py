@@ -1,4 +1,4 @@
-"""The licences of published twins: which may go out, whom to credit, and each in the words of the hub's cards."""
+"""Licences of published twins: selection by licence, attribution page, and the hub's licence identifiers."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from manitwin.pipeline.quality import REHEARSAL
 
 UNKNOWN = "unknown"
 A_REHEARSAL = ""
-"""No licence: the reason of what stays though its licences let it go."""
+"""Reason of refusal, in place of licence names, for twins whose licences allow publication but that are rehearsals."""
 LICENSES_MD = "LICENSES.md"
 
 _IDS_SHOWN = 50
-"""Twins of one author that are listed; of more the index tells."""
+"""Number of twins listed per author; the index has the others."""
 
 OF_TWINS = (
     "Each twin is a work made of its source (a photo, a text or a mesh, which is in the shard too) and stays under that source's "
@@ -28,7 +28,7 @@ _HUB_NAMES = {"odbl-1.0": "odbl", "odc-by-1.0": "odc-by", "pddl-1.0": "pddl"}
 
 
 class Terms(NamedTuple):
-    """What decides on a twin: its licence, and whether a rehearsal server (``manitwin fake``) had a part in it."""
+    """The properties that decide on publication: licence, and whether a rehearsal server (``manitwin fake``) took part."""
 
     licence: str
     rehearsal: bool
@@ -36,9 +36,9 @@ class Terms(NamedTuple):
 
 @dataclass(frozen=True)
 class Selection:
-    """The ids that go out, numbered as they came, those that stay here, and how many of these there are by licence.
+    """Published ids with their consecutive numbers, ids kept back, and the number of those per licence.
 
-    ``rehearsals`` are those that stay although their licences let them go: a rehearsal server made part of them.
+    ``rehearsals`` counts those kept back only because a rehearsal server made part of them.
     """
 
     published: dict[str, int]
@@ -48,14 +48,18 @@ class Selection:
 
 
 class Allowed:
-    """The terms under which twins may go out: licences by name, in any case (None: all that are known), and rehearsals."""
+    """Terms of publication: allowed licences by case-insensitive name (None: all but unknown), and whether rehearsals are
+    allowed.
+    """
 
     def __init__(self, licences: Iterable[str] | None, with_rehearsals: bool):
         self._named = None if licences is None else {name.strip().lower() for name in licences if name.strip()}
         self._with_rehearsals = with_rehearsals
 
     def refusal(self, twins: Sequence[Terms]) -> str | None:
-        """Return why what shows these twins may not go out, None where it may: ``CC-BY-NC-4.0 + unknown``, or ``A_REHEARSAL``."""
+        """Return why an item with these twins may not be published, ``CC-BY-NC-4.0 + unknown`` or ``A_REHEARSAL``; None if it
+        may.
+        """
         forbidden = {twin.licence for twin in twins if not self._has(twin.licence.lower())}
         if forbidden:
             return " + ".join(sorted(forbidden))
@@ -66,13 +70,13 @@ class Allowed:
 
 
 def terms_of(twins: Iterable[Mapping[str, Any]]) -> Iterator[tuple[str, list[Terms]]]:
-    """Yield the id and the terms of twins, rows with ``twin_id``, ``license`` and ``failed_checks``."""
+    """Yield the id and terms of twins, given as rows with ``twin_id``, ``license`` and ``failed_checks``."""
     for twin in twins:
         yield twin["twin_id"], [Terms(twin["license"] or UNKNOWN, REHEARSAL in twin["failed_checks"])]
 
 
 def select(noun: str, things: Iterable[tuple[str, Sequence[Terms]]], allowed: Allowed) -> Selection:
-    """Choose among things by id those whose twins are all allowed; raises UsageError where nothing may go out."""
+    """Select the items whose twins are all allowed; raises UsageError if none is."""
     published, kept_back, left_out = dict[str, int](), set[str](), Counter[str]()
     for name, twins in things:
         why = allowed.refusal(twins)
@@ -104,14 +108,15 @@ def _nothing_goes_out(noun: str, left_out: Mapping[str, int], rehearsals: int) -
 
 
 def without_attribution(twins: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return the ids of twins under a Creative Commons licence that asks for attribution, of which none is known."""
+    """Return the ids of twins under a Creative Commons licence that requires attribution but without an attribution."""
     return [t["twin_id"] for t in twins if t["license"].upper().startswith("CC-BY") and not t["attribution"]]
 
 
 def licenses_page(name: str, twins: Sequence[Mapping[str, Any]], *, introduction: str = OF_TWINS) -> str:
-    """Return LICENSES.md: every licence, whom to credit under it, and for which twins.
+    """Return LICENSES.md: every licence, the authors to credit under it, and their twins.
 
-    ``twins`` are rows with ``twin_id``, ``license``, ``attribution``, sorted by id. ``introduction`` says what is under them.
+    ``twins`` are rows with ``twin_id``, ``license``, ``attribution``, sorted by id. ``introduction`` states what the licences
+    cover.
     """
     by_licence: dict[str, dict[str, list[str]]] = {}
     for twin in twins:
@@ -194,12 +199,15 @@ HUB_LICENSES = frozenset(
         "unknown",
     }
 )
-"""The identifiers that a card may name, as far as they are SPDX's in lower case:
-https://huggingface.co/docs/hub/repositories-licenses"""
+"""Licence identifiers allowed on a card that equal the lower-case SPDX identifier:
+https://huggingface.co/docs/hub/repositories-licenses
+"""
 
 
 def hub_license(licences: Iterable[str]) -> dict[str, str]:
-    """Return the card's fields: the hub's identifier of the one licence, else ``other`` with a name and a link."""
+    """Return the licence fields of the card: the hub's identifier if there is one licence, else ``other`` with a name
+    and a link.
+    """
     different = sorted(set(licences))
     if len(different) == 1:
         lower = different[0].lower()

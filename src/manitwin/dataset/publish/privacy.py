@@ -1,4 +1,4 @@
-"""Check that nothing published names folders of this machine, or the people in them."""
+"""Privacy check of a publication: no published file may name local folders or home directories."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from manitwin.twin.record import TwinRecord
 from manitwin.twin.store import RECORD
 
 HOME_FOLDER = re.compile(rb"(?<![\w.\-])/(?:home|Users)/[^/\s\"]+/|\b[A-Za-z]:[\\/]+Users[\\/]")
-"""A folder of a person on Linux, macOS or Windows; in a web address a letter stands before the slash."""
+"""A home directory on Linux, macOS or Windows. In a URL, a letter precedes the slash, so that URLs do not match."""
 
 _TEXT = (".json", ".txt")
 
 
 def places_of(roots: Iterable[DatasetRoot]) -> tuple[bytes, ...]:
-    """Return the paths of local folders as they would be found in a file, with and without links resolved."""
+    """Return the paths of local folders as bytes to search for in files, with and without symbolic links resolved."""
     local = [root.local for root in roots if root.local is not None]
     found = {str(path) for folder in local for path in (folder.absolute(), folder.resolve())}
     return tuple(sorted(f"{place}/".encode() for place in found if len(Path(place).parts) > 2))
 
 
 def check_source(record: TwinRecord) -> None:
-    """Raise TwinError where a record's source is not a name alone."""
+    """Raise TwinError if a record's source is not a bare file name."""
     file = record.source.file
     if file != PurePosixPath(file).name or "\\" in file or file in ("", ".", ".."):
         raise TwinError(f"{record.twin_id}/{RECORD}: source.file is {file!r}, not a file name; build the twin again")
 
 
 def check_part(twin_id: str, part: str, content: bytes, places: tuple[bytes, ...]) -> None:
-    """Raise TwinError where a part of a twin names a local folder of the data set, or as text a person's folder.
+    """Raise TwinError if a part of a twin names a local folder of the data set or, in text files, a home directory.
 
-    The source is its author's, byte for byte, and is not searched for people's folders.
+    The source is published byte for byte and is not searched for home directories.
     """
     of_people = part.endswith(_TEXT) and not part.startswith("source.")
     remedy = "remove it from the name, prompt or attribution of the input, and build the twin again"
@@ -42,7 +42,7 @@ def check_part(twin_id: str, part: str, content: bytes, places: tuple[bytes, ...
 
 
 def check_words(where: str, words: str, places: tuple[bytes, ...], error: type[ManiTwinError]) -> None:
-    """Raise ``error`` where words that are to go out name a local folder of what is published, or a person's folder."""
+    """Raise ``error`` if a text to be published names a local folder of the data set or a home directory."""
     remedy = "remove it from the name, the prompt or the attribution that it comes from"
     _refuse_folders(where, words.encode(), places, error, remedy, of_people=True)
 

@@ -1,7 +1,7 @@
-"""The folder or URL that a data set is published to: files appear whole, and an interrupted one is gone on with.
+"""Target folder or URL of a publication: files are written atomically, and an interrupted publication can be resumed.
 
-OUT/SHA256SUMS is written last: a publication that has it is whole. Until then OUT/.publish/ holds a receipt of every shard
-that is finished; a shard whose receipt says what is to be in it is not written again.
+OUT/SHA256SUMS is written last and marks a complete publication. Until then, OUT/.publish/ holds a receipt per finished shard. A
+shard whose receipt matches its planned contents is not written again.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _RECEIPT = {"shard": str, "twins": int, "bytes": int, "sha256": str, "contents_s
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of publication: the ``folders`` that it owns besides ``.publish/``, and the ``sign`` that a finished one has."""
+    """A kind of publication: the ``folders`` that it owns besides ``.publish/``, and the file ``sign`` of a finished one."""
 
     name: str
     folders: tuple[str, ...]
@@ -46,9 +46,9 @@ EPISODES = Kind("episodes", ("meta", "data", "videos"), "meta/info.json")
 
 
 class Publication:
-    """Write files below one root and remember their digests.
+    """Writes files below one root and records their digests.
 
-    Owns: everything below the folders of its kind and ``.publish/`` of the root.
+    Owns everything below the folders of its kind and ``.publish/`` of the root.
     """
 
     def __init__(self, root: DatasetRoot, kind: Kind = TWINS):
@@ -58,13 +58,13 @@ class Publication:
         self._receipts: dict[str, dict[str, Any]] = {}
 
     def refuse_others(self) -> None:
-        """Raise UsageError where something else is there than nothing, or a publication of this kind, interrupted or older."""
+        """Raise UsageError unless the root is empty or has a publication of this kind, interrupted or older."""
         root = self.root
         root.fs.invalidate_cache()
         if root.exists(_STARTED):
             begun = (
                 root.read_bytes(_STARTED, UsageError, limit_bytes=1024).decode(errors="replace") or TWINS.name
-            )  # an older version wrote it empty, for twins
+            )  # older versions wrote an empty file, for twins
             if begun != self.kind.name:
                 raise UsageError(
                     f"{root.url}: it contains an unfinished publication of {begun}; give a new or empty folder"
@@ -76,7 +76,7 @@ class Publication:
             )
 
     def begin(self) -> None:
-        """Open a new publication, an interrupted one or an older one. Raises UsageError where something else is there."""
+        """Open a new, interrupted or older publication. Raises UsageError if the root has anything else."""
         self.refuse_others()
         root = self.root
         if not root.exists(_STARTED):
@@ -105,7 +105,7 @@ class Publication:
         return [name for name in names if not name.startswith(".")]
 
     def has(self, shard: Shard) -> bool:
-        """Tell whether a shard is there with what is to be in it; its digest then counts as written."""
+        """Return whether a shard with the planned contents exists; its digest then counts as written."""
         receipt = self._receipts.get(shard.name)
         if receipt is None or receipt["contents_sha256"] != shard.contents_sha256 or not self.root.exists(shard.name):
             return False
@@ -115,7 +115,7 @@ class Publication:
         return True
 
     def write_shard(self, shard: Shard, write: Callable[[BinaryIO], None]) -> None:
-        """Write a shard to a temporary file, put it in its place and note that it is there."""
+        """Write a shard to a temporary file, move it into place and write its receipt."""
         receipt = _receipt_name(shard.name)
         with self.scratch() as scratch:
             path = scratch / "shard.tar"
@@ -123,7 +123,7 @@ class Publication:
                 write(stream)
                 stream.flush()
                 os.fsync(stream.fileno())
-            self.root.remove(receipt)  # what it says of an older shard is true no longer
+            self.root.remove(receipt)  # the receipt of an older shard is no longer valid
             self.put(path, shard.name)
         self._write_receipt(self.row(shard))
 
@@ -138,7 +138,7 @@ class Publication:
         }
 
     def put(self, path: Path, name: str) -> None:
-        """Take a finished file of the root's own file system to its place."""
+        """Move a finished file, on the root's own file system, into place."""
         self.digests[name], self.sizes[name] = sha256_of_file(path), path.stat().st_size
         if self.root.local is None:
             self.root.put_file(path, name)
@@ -153,7 +153,7 @@ class Publication:
         self.digests[name], self.sizes[name] = sha256(content).hexdigest(), len(content)
 
     def finish(self) -> None:
-        """Remove what an older publication had more, and write the digests of all files."""
+        """Remove files left from an older publication, and write the digests of all files."""
         check_hub_limits({**self.sizes, SUMS: 0})
         there = {name for folder in self.kind.folders for name in self.root.names_below(folder)}
         for name in there - self.digests.keys():
@@ -167,10 +167,10 @@ class Publication:
 
     @contextmanager
     def scratch(self) -> Iterator[Path]:
-        """Yield a temporary folder from which files can be ``put``; nothing has to be begun for it.
+        """Yield a temporary folder for files to ``put``; the publication need not have begun.
 
-        Of a local root it is below ``.publish/``: what one that was killed left there goes. A root that was not there
-        before and has nothing in it afterwards goes too.
+        For a local root, the folder is below ``.publish/``, where leftovers of killed processes are removed first. A root that
+        did not exist before and is empty afterwards is removed.
         """
         if self.root.local is None:
             with tempfile.TemporaryDirectory() as scratch:

@@ -1,4 +1,4 @@
-"""Publish a data set: choose by licence, plan, write shards, tables and card."""
+"""Publication of a data set: select by licence, plan shards, and write shards, tables and card."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 
 SHARD_SIZE_MB = 1000
-"""A shard is what one downloads to look at a category: some hundred twins."""
+"""Size of a shard, a convenient download to inspect a category: a few hundred twins."""
 
 PICTURES = 3
 PICTURE_FOLDER = "pictures"
@@ -50,7 +50,7 @@ MEGABYTE = 10**6
 
 @dataclass(frozen=True)
 class ShardDone:
-    """A shard is in its place: the ``number``-th of ``total``; ``kept`` where it was there already."""
+    """Progress event: shard ``number`` of ``total`` is in place; ``kept`` if it already existed."""
 
     name: str
     number: int
@@ -60,10 +60,11 @@ class ShardDone:
 
 @dataclass(frozen=True)
 class Published:
-    """The counts of a publication: what went out, and what was left out.
+    """Counts of a publication.
 
-    ``left_out`` counts accepted twins by licence; ``without_attribution`` those published whose licence asks for it,
-    ``rehearsals`` those left out because a rehearsal server had a part in them. ``rows`` are those of the published tables.
+    ``left_out`` counts accepted twins by licence, ``rehearsals`` those left out because a rehearsal server made part of them, and
+    ``without_attribution`` published twins whose licence requires an attribution that is missing. ``rows`` is the number of rows
+    per published table.
     """
 
     twins: int
@@ -89,14 +90,13 @@ def publish_dataset(
     name: str | None = None,
     on_shard: Callable[[ShardDone], None] = lambda done: None,
 ) -> Published:
-    """Write WebDataset shards, Parquet tables, the dataset card, licences and digests of a data set to ``out``.
+    """Write WebDataset shards, Parquet tables, dataset card, licences and digests of a data set to ``out``.
 
     ``dataset`` and ``out`` are folders or URLs; the index of the data set must be up to date. ``license_allow`` names the
-    licences that may go out; by default all but ``unknown``. Twins that a rehearsal server (``manitwin fake``) had a part in
-    stay here unless ``with_rehearsals``. Shards hold at most ``shard_size_mb`` (10^6 bytes), or one
-    twin that is larger, and at most ``twins_per_shard`` twins. The same data set gives the same bytes. Interrupted, it can
-    be called again, and finished shards stay. Raises UsageError for wrong arguments, TwinError for a twin that is altered,
-    incomplete or names a folder of this machine.
+    licences to publish, by default all but ``unknown``. Twins that a rehearsal server (``manitwin fake``) helped to make are kept
+    back unless ``with_rehearsals``. A shard holds at most ``shard_size_mb`` (10^6 bytes), or a single larger twin, and at most
+    ``twins_per_shard`` twins. The same data set gives the same bytes. After an interruption, call it again: finished shards are
+    kept. Raises UsageError for invalid arguments, and TwinError for a twin that is altered, incomplete or names a local folder.
     """
     _check(shard_size_mb, twins_per_shard)
     source, publication = DatasetRoot(dataset), Publication(DatasetRoot(out))
@@ -159,7 +159,7 @@ def _shard_twins(rows: list[dict[str, Any]], tar_bytes: Mapping[str, int], selec
 def _write_shards(
     source: DatasetRoot, publication: Publication, shards: list[Shard], on_shard: Callable[[ShardDone], None]
 ) -> int:
-    """Write all shards that are not there yet; returns how many were."""
+    """Write all missing shards; return the number of shards that already existed."""
     places = places_of([source, publication.root])
     kept = 0
     for number, shard in enumerate(shards, 1):
@@ -174,7 +174,7 @@ def _write_shards(
 def _write_tables(
     source: DatasetRoot, publication: Publication, parts: PartList, shards: list[Shard], selection: Selection
 ) -> tuple[list[dict[str, Any]], dict[str, int]]:
-    """Write the tables; returns what the card needs of the twins, and the rows of each table."""
+    """Write the tables; return the twin columns that the card needs, and the number of rows per table."""
     shard_of = {twin.twin_id: shard.name for shard in shards for twin in shard.twins}
     counts = {**dict.fromkeys(PUBLISHED, 0), "shards": len(shards)}
     twins: list[dict[str, Any]] = []
@@ -189,7 +189,7 @@ def _write_tables(
 
 
 def _write_pages(source: DatasetRoot, publication: Publication, facts: CardFacts) -> None:
-    """Write the pictures that the card shows, the licences and the card."""
+    """Write the card's pictures, the licence page and the card."""
     for picture in facts.pictures:
         twin_id = Path(picture).stem
         publication.write(picture, source.read_bytes(f"{source.twin_name(twin_id)}/{CARD}"))
@@ -198,7 +198,7 @@ def _write_pages(source: DatasetRoot, publication: Publication, facts: CardFacts
 
 
 def _pictures(source: DatasetRoot, twins: list[dict[str, Any]]) -> list[str]:
-    """Return the pictures to show: of the twins with most verified grasps, each of another category."""
+    """Return the pictures to show: cards of the twins with most verified grasps, one per category."""
     best: dict[str, str] = {}
     for twin in sorted(twins, key=lambda twin: (-twin["verified"], twin["twin_id"])):
         best.setdefault(twin["category"], twin["twin_id"])

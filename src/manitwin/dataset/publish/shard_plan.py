@@ -1,4 +1,6 @@
-"""Plan shards: twins by category, in order of ids, within a size and the hub's limits; their sizes are those of a listing."""
+"""Shard planning: twins are grouped by category in id order, within a size limit and the hub's limits, by their listed file
+sizes.
+"""
 
 from __future__ import annotations
 
@@ -17,20 +19,20 @@ from manitwin.twin.store import RECORD, sha256_of_json
 HUB_FILES = 100_000
 HUB_FOLDER_ENTRIES = 10_000
 HUB_FILE_BYTES = 20 * 10**9
-"""What a repository should stay below: https://huggingface.co/docs/hub/repositories-recommendations"""
+"""Recommended limits of a repository: https://huggingface.co/docs/hub/repositories-recommendations"""
 
 CATEGORY_FOLDERS = 5_000
-"""Categories that get a folder of their own, the largest ones; half of what the hub lets one folder hold."""
+"""Number of categories, largest first, with a folder of their own: half of the hub's limit on entries of one folder."""
 
 VIEWS = "views"
 SHARED_FOLDER = "various"
 DATA = "data"
 SHARD_FORMAT = 1
-"""Counted up when the members of a shard change: then no shard of an older publication is taken over."""
+"""Increased when the members of a shard change, which invalidates the shards of older publications."""
 
 TAR_BLOCK = 512
 TAR_RECORD = 10_240
-"""POSIX ustar: members begin at blocks, an archive ends at a record (``tarfile.RECORDSIZE``)."""
+"""POSIX ustar: members start at block boundaries, an archive ends at a record boundary (``tarfile.RECORDSIZE``)."""
 
 _SLUG_LENGTH = 64
 
@@ -39,9 +41,9 @@ _END_OF_ZIP = 22  # bytes of the end-of-central-directory record (APPNOTE.TXT 4.
 
 @dataclass(frozen=True)
 class ShardTwin:
-    """A twin that goes out: ``tar_bytes`` is what its members take at most, headers included.
+    """A twin to publish; ``tar_bytes`` is an upper bound of the size of its members, headers included.
 
-    ``costs`` (seconds, CPU seconds, dollars) stand for its run.json, which its revision does not cover.
+    ``costs`` (seconds, CPU seconds, dollars) represent its run.json, which its revision does not cover.
     """
 
     twin_id: str
@@ -53,36 +55,38 @@ class ShardTwin:
 
 @dataclass(frozen=True)
 class Shard:
-    """A tar file and the twins in it, by id."""
+    """A tar file and its twins, sorted by id."""
 
     name: str
     twins: tuple[ShardTwin, ...]
 
     @property
     def tar_bytes(self) -> int:
-        """The most that the file takes."""
+        """Upper bound of the file size."""
         return archive_bytes(sum(twin.tar_bytes for twin in self.twins))
 
     @property
     def contents_sha256(self) -> str:
-        """The digest of what is to be in it: equal contents give equal bytes."""
+        """Digest of the planned contents; equal digests mean equal bytes."""
         return sha256_of_json([SHARD_FORMAT, [(twin.twin_id, twin.revision, twin.costs) for twin in self.twins]])
 
 
 def member_bytes(size: int) -> int:
-    """Return what a file of a size takes in a tar: its header and whole blocks."""
+    """Return the size of a file in a tar archive: its header and whole blocks."""
     return TAR_BLOCK + -(-size // TAR_BLOCK) * TAR_BLOCK
 
 
 def archive_bytes(members: int) -> int:
-    """Return the size of a tar whose members take so many bytes: two empty blocks, then whole records."""
+    """Return the size of a tar archive with members of a total size: two empty blocks are added, then padding to
+    whole records.
+    """
     return -(-(members + 2 * TAR_BLOCK) // TAR_RECORD) * TAR_RECORD
 
 
 def category_slug(category: str) -> str:
-    """Return a category as a folder's name: lower-case ASCII letters, digits and single hyphens, 64 characters at most.
+    """Return a category as a folder name: lower-case ASCII letters, digits and single hyphens, at most 64 characters.
 
-    A category without any such letter gets a name of its digest. Different spellings of one name share a folder.
+    A category without any such character is named by its digest. Different spellings of one name share a folder.
     """
     ascii_only = unicodedata.normalize("NFKD", category).encode("ascii", "ignore").decode().lower()
     slug = re.sub(r"[^a-z0-9]+", "-", ascii_only).strip("-")[:_SLUG_LENGTH].rstrip("-")
@@ -92,9 +96,9 @@ def category_slug(category: str) -> str:
 def plan_shards(twins: Iterable[ShardTwin], *, max_bytes: int, max_twins: int | None = None) -> list[Shard]:
     """Return the shards of all twins, sorted by name.
 
-    Each category has its own shards, as one wants mugs and not a tenth of everything; only beyond ``CATEGORY_FOLDERS``
-    do the smallest share those of the folder ``various``. A shard takes no more than ``max_bytes``, unless a single twin
-    does. Raises UsageError where the hub's limits would be broken.
+    Each category has its own shards, so that single categories can be downloaded. Categories beyond the ``CATEGORY_FOLDERS``
+    largest share the folder ``various``. A shard is at most ``max_bytes`` large, unless a single twin is larger. Raises
+    UsageError if the hub's limits would be exceeded.
     """
     by_folder: dict[str, list[ShardTwin]] = {}
     for twin in sorted(twins, key=lambda twin: twin.twin_id):
@@ -127,7 +131,7 @@ def _groups(twins: list[ShardTwin], max_bytes: int, max_twins: int | None) -> It
 
 
 def check_hub_limits(sizes: dict[str, int]) -> None:
-    """Raise UsageError where files of these names and sizes are more or larger than the hub takes."""
+    """Raise UsageError if files of these names and sizes exceed the hub's limits on number or size."""
     if len(sizes) >= HUB_FILES:
         raise UsageError(
             f"{len(sizes):,} files, but the hub allows fewer than {HUB_FILES:,}; give a larger --shard-size-mb"
@@ -150,9 +154,10 @@ def check_hub_limits(sizes: dict[str, int]) -> None:
 
 
 def tar_bytes_of_twins(root: DatasetRoot) -> dict[str, int]:
-    """Return what each finished twin takes in a tar at most, by its id.
+    """Return an upper bound of the size of each finished twin in a tar archive, by id.
 
-    An entry of an archive takes less than the tar header that is counted for it. Raises UsageError where there are no twins.
+    An entry of a ZIP archive takes less space than the tar header that is counted for it. Raises UsageError if there are no
+    twins.
     """
     root.fs.invalidate_cache()
     if root.flat:

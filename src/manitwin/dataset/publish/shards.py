@@ -1,9 +1,9 @@
-"""Write shards and read them back: each file checked against its twin's digests; a tar has no date and no owner.
+"""Writing and reading of shards. Each file is verified against its twin's digests; tar members have no dates and owners.
 
-webdataset splits a member's name at the first dot: what is before it is the sample's key (the twin's id), what is after it
-the name of the part. A part has no folder, so ``views/rgb_00.webp`` is ``rgb_00.webp``, and every other folder is one
-archive: ``collision/hull_00.obj ...`` are ``collision.zip``. It is stored uncompressed: the same bytes with any zlib, no
-archive that unfolds into more than it weighs, and the files keep the bytes that twin.json has the digests of.
+webdataset splits a member's name at the first dot into the sample key (the twin id) and the part name. Parts have no folders:
+``views/rgb_00.webp`` becomes ``rgb_00.webp``, and every other folder becomes one archive, ``collision/hull_00.obj ...`` is
+``collision.zip``. Archives are stored uncompressed. Their bytes then do not depend on the zlib version, they cannot be
+decompression bombs, and the files keep the bytes whose digests are in twin.json.
 """
 
 from __future__ import annotations
@@ -37,29 +37,29 @@ from manitwin.twin.store import (
 )
 
 KEY = re.compile(r"[0-9A-Za-z_-]+")
-"""What can be the key of a sample and the name of a folder."""
+"""Valid sample keys and folder names."""
 
 _FILE = re.compile(r"[0-9A-Za-z_-][0-9A-Za-z_.-]*(?:/[0-9A-Za-z_-][0-9A-Za-z_.-]*)*")
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date of a ZIP entry
 
 
 def write_shard(stream: BinaryIO, root: DatasetRoot, shard: Shard, places: tuple[bytes, ...]) -> None:
-    """Write the tar of a shard; the same twins give the same bytes.
+    """Write the tar archive of a shard; equal twins give equal bytes.
 
-    ``places`` are local paths that may not be in it. Raises TwinError for a twin that is altered, incomplete or names such
-    a path, UsageError for one that is not what the index says.
+    ``places`` are local paths that must not occur in it. Raises TwinError for a twin that is altered, incomplete or names such a
+    path, and UsageError for a twin whose revision differs from the index.
     """
     with tarfile.open(fileobj=stream, mode="w", format=tarfile.PAX_FORMAT) as tar:
         for twin in shard.twins:
             for part, content in twin_parts(root, twin):
                 check_part(twin.twin_id, part, content, places)
-                member = tarfile.TarInfo(f"{twin.twin_id}.{part}")  # no owner, no date, mode 644: its defaults
+                member = tarfile.TarInfo(f"{twin.twin_id}.{part}")  # default owner, date and mode 644
                 member.size = len(content)
                 tar.addfile(member, io.BytesIO(content))
 
 
 def twin_parts(root: DatasetRoot, twin: ShardTwin) -> Iterator[tuple[str, bytes]]:
-    """Yield a twin's parts by name: its files, and run.json without the machine that it ran on."""
+    """Yield the name and bytes of each part of a twin: its files, and run.json without the host."""
     folder = root.twin_name(twin.twin_id)
     content = _contents(root, folder, [RECORD])[RECORD]
     record = _record(root, twin, content)
@@ -80,7 +80,7 @@ def _contents(root: DatasetRoot, folder: str, names: list[str]) -> dict[str, byt
         if root.local is not None:
             return {name: root.read_bytes(f"{folder}/{name}") for name in names}
         paths = {root.full(f"{folder}/{name}"): name for name in names}
-        return {paths[path]: content for path, content in root.fs.cat(list(paths)).items()}  # all at once
+        return {paths[path]: content for path, content in root.fs.cat(list(paths)).items()}  # all files concurrently
     except FileNotFoundError as error:
         raise TwinError(f"{root.full(folder)}: a file is missing ({error}); build the twin again") from error
 
@@ -108,9 +108,9 @@ def _run(root: DatasetRoot, folder: str) -> bytes | None:
 
 
 def parts_of(files: Iterable[str]) -> dict[str, list[str]]:
-    """Return ``{part: names of its files}``, sorted, of a twin's files.
+    """Return ``{part: names of its files}``, sorted, for the files of a twin.
 
-    Raises TwinError for a name that leaves the folder or that two parts would share.
+    Raises TwinError for a file name that leaves the folder, and for two files with the same part name.
     """
     parts: dict[str, list[str]] = {}
     single: set[str] = set()
@@ -121,7 +121,7 @@ def parts_of(files: Iterable[str]) -> dict[str, list[str]]:
             )
         path, alone = PurePosixPath(file), not is_archive([file])
         part = path.name if alone else f"{path.parts[0]}.zip"
-        part = part.lower()  # as webdataset reads it
+        part = part.lower()  # webdataset lower-cases part names
         if part in single or (alone and part in parts):
             raise TwinError(f"{file}: another file of the twin has the same part {part!r}; rename one of them")
         if alone:
@@ -131,13 +131,13 @@ def parts_of(files: Iterable[str]) -> dict[str, list[str]]:
 
 
 def is_archive(files: list[str]) -> bool:
-    """Tell whether the files of a part are kept in an archive."""
+    """Return whether the files of a part are stored in an archive."""
     parts = PurePosixPath(files[0]).parts
     return len(parts) > 2 or (len(parts) == 2 and parts[0] != VIEWS)
 
 
 def pack(files: list[str], contents: Mapping[str, bytes]) -> bytes:
-    """Return a part's bytes: the file's own, or an uncompressed, undated archive of the folder's files."""
+    """Return a part's bytes: those of its file, or an uncompressed, undated ZIP archive of the folder's files."""
     if not is_archive(files):
         return contents[files[0]]
     stream = io.BytesIO()
@@ -150,7 +150,7 @@ def pack(files: list[str], contents: Mapping[str, bytes]) -> bytes:
 
 
 def unpack(files: list[str], content: bytes) -> dict[str, bytes]:
-    """Return the files of a part; raises TwinError for an archive that holds anything else or is compressed."""
+    """Return the files of a part; raises TwinError for an archive that is compressed or has other entries."""
     if not is_archive(files):
         return {files[0]: content}
     folder = files[0].partition("/")[0]
@@ -167,12 +167,12 @@ def unpack(files: list[str], content: bytes) -> dict[str, bytes]:
 
 
 def unpack_shard(shard: str | Path, out: str | Path) -> list[Path]:
-    """Write the twins of a shard into a data set at ``out`` (``out/twins/<2 hex>/<twin_id>/``); returns their folders.
+    """Write the twins of a shard into a data set at ``out`` (``out/twins/<2 hex>/<twin_id>/``); return their folders.
 
-    A twin is written beside its place, verified against its own digests and renamed, so that no folder is ever half made;
-    one that is there already is replaced. Raises UsageError for a shard that is not there, and TwinError, naming the
-    member, for anything that no shard of ours has: links, devices, sparse files, names with folders, parts that twin.json
-    does not name, altered files.
+    A twin is written to a temporary folder, verified against its own digests and renamed into place, so that no folder is ever
+    incomplete; an existing twin is replaced. Raises UsageError if the shard is missing. Raises TwinError, naming the member, for
+    content that no valid shard has: links, devices, sparse files, names with folders, parts that twin.json does not name, and
+    altered files.
     """
     path, place = Path(shard), Path(out)
     open_regular(path, UsageError, name=str(shard)).close()
@@ -190,7 +190,7 @@ def unpack_shard(shard: str | Path, out: str | Path) -> list[Path]:
 
 
 def samples(shard: Path) -> Iterator[tuple[str, dict[str, bytes]]]:
-    """Yield the key and the parts of each sample of a shard; raises TwinError for a member that none of ours has."""
+    """Yield the key and parts of each sample of a shard; raises TwinError for members that no valid shard has."""
     key, parts = "", dict[str, bytes]()
     with tarfile.open(shard, "r:") as tar:
         for member in tar:

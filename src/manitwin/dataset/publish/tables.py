@@ -1,4 +1,4 @@
-"""The tables that go out: those of the index, of the published twins alone, with the shard of each twin."""
+"""Published tables: the index tables restricted to the published twins, with the shard of each twin."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 
 PUBLISHED = ("twins", "points", "grasps", "placements")
-"""Rejections and costs by stage stay here: they tell of the run, and their words may name files of its machine."""
+"""Published tables. Rejections and stage costs are not published: they describe the run, and their texts may name local files."""
 
 INDEX = "index"
 SHARDS_FILE = f"{INDEX}/shards-00000.parquet"
@@ -31,7 +31,7 @@ SHARDS = pa.schema(
 
 
 def parts_of_index(root: DatasetRoot, finished: set[str]) -> PartList:
-    """Return the parts of a data set's index; raises UsageError where it lacks finished twins or has others."""
+    """Return the parts of a data set's index; raises UsageError if its twins are not exactly the finished ones."""
     parts = read_part_list(root)
     if parts is None or not parts.parts:
         raise no_index(root)
@@ -48,7 +48,7 @@ def parts_of_index(root: DatasetRoot, finished: set[str]) -> PartList:
 
 
 def rows_of_table(root: DatasetRoot, parts: PartList, table: str, columns: list[str]) -> list[dict[str, Any]]:
-    """Return some columns of all rows of a table, in no order."""
+    """Return some columns of all rows of a table, unordered."""
     rows = read_rows(files_of(root, parts.parts), table, file_system(root), columns=columns)
     found: list[dict[str, Any]] = rows.to_pylist()
     return found
@@ -59,18 +59,18 @@ def published_rows(
 ) -> Iterator[dict[str, pa.Table]]:
     """Yield the rows of the published tables, sorted by twin, about a million grasps at a time.
 
-    ``shard_of`` is the shard of each twin by its id; ``kept_back`` are the accepted twins of the index that stay here.
+    ``shard_of`` maps twin ids to shards; ``kept_back`` are the accepted twins of the index that are not published.
     """
     for rows in merged(files_of(root, parts.parts), file_system(root), parts.rows("grasps"), without=kept_back):
         twins = rows["twins"]
-        if not len(twins):  # a range of rejected ones
+        if not len(twins):  # an id range with rejected twins only
             continue
         shards = pa.array([shard_of[twin_id] for twin_id in twins["twin_id"].to_pylist()], pa.string())
         yield {table: rows[table] for table in PUBLISHED} | {"twins": twins.append_column("shard", shards)}
 
 
 def columns_of(table: str) -> list[str]:
-    """Return the names of a published table's columns."""
+    """Return the column names of a published table."""
     if table == "shards":
         return list(SHARDS.names)
     return [*TABLES[table].names, *(["shard"] if table == "twins" else [])]

@@ -37,11 +37,11 @@ KINDS = {
 }  # fmt: skip
 """Words for all objects of a domain of the priors."""
 SATURATION, LENGTH_SHARE = 1.2, 0.75
-"""k1 and b of BM25, as Robertson and Zaragoza 2009 give them, section 3.5."""
+"""k1 and b of BM25 as in Robertson and Zaragoza 2009, section 3.5."""
 SIZE_SHARE = 0.25
 """Largest relative bonus of the smallest (largest) twin of a category if small (large) ones are requested."""
 MOST_NEAR, NEARLY = 3, 0.75
-"""How many words that are spelt nearly as an unknown one are told, and how like it they are (difflib's ratio)."""
+"""Maximum number of similarly spelt words suggested for an unknown word, and their minimum similarity (difflib's ratio)."""
 _NOT_A_COLOR = re.compile(r"\(.*?\)|unknown color")
 _COLORS = frozenset(
     "black white grey gray silver red green blue yellow orange brown pink purple beige gold golden cream".split()  # noqa: SIM905
