@@ -143,7 +143,7 @@ def _write_clouds(folder: Path, row: dict[str, Any], points: SurfacePoints) -> N
         "rgb": points.rgb,
     }
     stream = io.BytesIO()
-    np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]  # type: ignore[arg-type] # numpy's stub takes names for its own flags
+    np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]  # numpy's stub takes names for its own flags
     row["cloud"] = f"clouds/{row['twin_id']}.npz"
     _write(folder / row["cloud"], stream.getvalue())
     y_up = points.points_m[:, [0, 2, 1]] * [1, 1, -1]

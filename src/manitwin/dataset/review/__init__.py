@@ -1,1 +1,1 @@
-"""People judge twins: a sample, queues, verdicts that are never lost, and what they say of a data set."""
+"""Human review of twins: sampling, annotator queues, durable storage of verdicts, and their statistics."""

@@ -1,4 +1,4 @@
-"""Agreement of several raters, not all of whom rated everything: raw, Krippendorff's alpha, Gwet's AC1."""
+"""Agreement of several raters with missing ratings: raw agreement, Krippendorff's alpha, Gwet's AC1."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 Ratings = Mapping[str, Mapping[str, str]]
-"""Label by rater, by item."""
+"""Labels by item, then by rater."""
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Agreement on the ``items`` that two or more rated; None where it is not defined.
+    """Agreement on the ``items`` with two or more ratings; coefficients are None where undefined.
 
-    ``raw`` is the mean over items of the share of agreeing pairs. ``alpha`` is not defined where all labels are equal: nothing
-    can be told from chance then. ``ac1`` is what to read where nearly all labels are (K. L. Gwet 2008: kappa's paradox).
+    ``raw`` is the mean over items of the share of agreeing rater pairs. ``alpha`` is undefined if all labels are equal, since
+    agreement then cannot be told from chance. Use ``ac1`` if nearly all labels are equal (K. L. Gwet 2008: kappa's paradox).
     """
 
     items: int
@@ -34,7 +34,7 @@ def agreement_of(ratings: Ratings, labels: Sequence[str]) -> Agreement:
 
 
 def raw_agreement(items: Iterable[Mapping[str, str]]) -> float:
-    """Return the mean over items with two raters or more of the share of pairs that agree (Gwet 2014, eq. 2.7)."""
+    """Return the mean, over items with two or more raters, of the share of rater pairs that agree (Gwet 2014, eq. 2.7)."""
     shares = []
     for of in items:
         raters = len(of)
@@ -44,17 +44,17 @@ def raw_agreement(items: Iterable[Mapping[str, str]]) -> float:
 
 
 def krippendorff_alpha(ratings: Ratings) -> float | None:
-    """Return Krippendorff's alpha of nominal labels (NLTK's); None where all labels are equal."""
+    """Return Krippendorff's alpha for nominal labels, computed by NLTK; None if all labels are equal."""
     if len({label for of in ratings.values() if len(of) >= 2 for label in of.values()}) < 2:
         return None
-    from nltk.metrics.agreement import AnnotationTask  # takes 1.5 CPU-s
+    from nltk.metrics.agreement import AnnotationTask  # the import takes 1.5 CPU-s
 
     rows = [(rater, item, label) for item, of in ratings.items() for rater, label in of.items()]
     return float(AnnotationTask(data=rows).alpha())
 
 
 def gwet_ac1(items: Iterable[Mapping[str, str]], labels: Sequence[str]) -> float | None:
-    """Return Gwet's AC1 of several raters with missing ratings; None where nothing was rated twice.
+    """Return Gwet's AC1 for several raters with missing ratings; None if no item has two ratings.
 
     K. L. Gwet, Computing inter-rater reliability and its variance in the presence of high agreement, 2008, eq. 13 to 15, with
     missing ratings as in his Handbook of Inter-Rater Reliability, 4th ed., 2014, section 2.5.

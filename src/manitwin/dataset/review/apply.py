@@ -1,4 +1,4 @@
-"""``manitwin review apply``: corrections become amendments of the twins, and what follows from them is made again."""
+"""``manitwin review apply``: store corrections as amendments of twins and rebuild the affected stages."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ from manitwin.twin.record import TwinRecord
 
 @dataclass(frozen=True)
 class Applied:
-    """What was, or would be, put right: ``run`` is None where nothing was made again; ``left`` says of twins why they are not.
+    """Result of applying corrections. ``run`` is None if nothing was rebuilt; ``left`` maps twin ids to reasons why they were
+    not.
 
-    ``rejected``: why twins are none any more with what was put right, by their ids.
+    ``rejected`` maps the ids of twins that are rejected after the rebuild to the reasons.
     """
 
     corrections: list[Correction]
@@ -42,10 +43,10 @@ class Applied:
 def apply_reviews(
     dataset: str, *, dry_run: bool = False, jobs: int | None = None, **options: Unpack[RunOptions]
 ) -> Applied:
-    """Write the corrections that nobody contradicts into the data set, and make the twins again from the first stage they change.
+    """Write the undisputed corrections into the data set and rebuild the twins from the first stage that they change.
 
-    Only verdicts on twins as they are now count. Raises UsageError where there are no reviews, no index or no ledger, and where
-    another run is at work there.
+    Only verdicts on the current revisions count. Raises UsageError if there are no reviews, no index or no ledger, and if another
+    run is active on the data set.
     """
     root = DatasetRoot(dataset)
     with ReviewStore(reviews_path(root), make=False) as store:
@@ -66,7 +67,7 @@ def apply_reviews(
 
 
 def amended(before: Amendments, corrections: Iterable[Correction], record: TwinRecord) -> Amendments:
-    """Return a twin's amendments with more corrections: of one thing the last counts."""
+    """Return a twin's amendments with additional corrections; the last correction of a value wins."""
     after: dict[str, dict[str, Any]] = {stage: dict(said) for stage, said in before.items()}
     for each in corrections:
         key = each.name if each.name in (CATEGORY, MASS, SIZE) else MOVES
@@ -88,7 +89,7 @@ def amended(before: Amendments, corrections: Iterable[Correction], record: TwinR
 
 
 def _marked_m(record: TwinRecord) -> np.ndarray:
-    """Return the positions ``(N, 3)`` of a twin's candidates as they were chosen, before a closer look moved some."""
+    """Return the positions ``(N, 3)`` in metres of a twin's candidates as sampled, before refinement moved some of them."""
     assert record.points is not None, "an accepted twin has points"
     positions_m = np.array(record.points.candidates.positions_m, float)
     for each in record.points.candidates.refined:
@@ -107,7 +108,7 @@ def _label(record: TwinRecord, point_id: str) -> str | None:
 
 
 def _rejected(root: DatasetRoot, twin_ids: Iterable[str]) -> dict[str, str]:
-    """Return of those of the twins that are rejected now the code and what is said of it."""
+    """Return the reason code and detail of those twins that are now rejected."""
     found = dict[str, str]()
     with read_ledger(local_ledger(root)) as ledger:
         for twin_id in twin_ids:
@@ -120,7 +121,7 @@ def _rejected(root: DatasetRoot, twin_ids: Iterable[str]) -> dict[str, str]:
 
 
 def _items(root: DatasetRoot, twin_ids: Iterable[str]) -> dict[str, tuple[int, Item]]:
-    """Return the number and the item of each twin that the ledger has made."""
+    """Return the ledger number and item of each accepted twin that the ledger has."""
     path, found = local_ledger(root), dict[str, tuple[int, Item]]()
     with read_ledger(path) as ledger:
         for twin_id in twin_ids:

@@ -1,4 +1,4 @@
-"""Which corrections are to be applied: those that no annotator contradicts."""
+"""Selection of corrections to apply: those that no annotator contradicts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from manitwin.pipeline.human_corrections import HUMAN
 
 @dataclass(frozen=True)
 class Correction:
-    """One value of one twin that is corrected; ``source`` is human:<annotator>, of several ``human:ada+ben``."""
+    """A corrected value of one twin. ``source`` is human:<annotator>, for several annotators ``human:ada+ben``."""
 
     twin_id: str
     dimension: Dimension
@@ -25,7 +25,7 @@ class Correction:
 
 @dataclass(frozen=True)
 class Conflict:
-    """A correction that is not applied, as annotators contradict each other: what each of them says, 'yes' for what is there."""
+    """A correction that is not applied because annotators disagree: the statement of each, 'yes' for the current value."""
 
     twin_id: str
     dimension: Dimension
@@ -34,11 +34,11 @@ class Conflict:
 
 
 def settled(reviews: Iterable[Stored]) -> tuple[list[Correction], list[Conflict]]:
-    """Return what all who judged a twin agree on, and what they do not.
+    """Return the corrections on which all annotators of a twin agree, and the conflicts.
 
-    ``reviews`` has at most one of an annotator on a twin. A correction is contradicted by another value, and by a yes in its
-    dimension; who is unsure, or says no and gives no value, contradicts nothing. Categories are the same where the priors' names
-    are; numbers where they are equal with their intervals.
+    ``reviews`` has at most one review per annotator and twin. A correction is contradicted by a different value and by a yes in
+    its dimension; an "unsure", or a "no" without a value, contradicts nothing. Categories are compared by their normalized names
+    in the priors, numbers including their intervals.
     """
     by_twin: dict[str, list[Stored]] = {}
     for each in reviews:
@@ -55,7 +55,7 @@ def settled(reviews: Iterable[Stored]) -> tuple[list[Correction], list[Conflict]
 
 
 def _proposals(reviews: list[Stored]) -> Iterator[tuple[Dimension, str, dict[str, Any]]]:
-    """Yield of each value that somebody corrects what each annotator says of it: a value, or 'yes'."""
+    """Yield each corrected value with the statement of each annotator on it: a value, or 'yes'."""
     for dimension in DIMENSIONS:
         by_name: dict[str, dict[str, Any]] = {}
         for review in (each.review for each in reviews):

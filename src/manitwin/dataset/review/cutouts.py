@@ -1,4 +1,4 @@
-"""``manitwin review cutouts``: people look at cut-outs that were doubted, and what they confirm is built."""
+"""``manitwin review cutouts``: inspect low-confidence mattes, and build the photos whose mattes are confirmed."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import RECORD, parse_record
 
 SHOWN = 48
-"""Cut-outs on one sheet."""
+"""Mattes per sheet."""
 AROUND = (200, 0, 200)
-"""The colour of what a cut-out leaves away: magenta, which few things and grounds have."""
+"""Tint of the removed background: magenta, which is rare in objects and backgrounds."""
 BELIEVED = "its cut-out was believed"
 DIMMED = 0.25
-"""How much of the photo is still seen where it would be cut away."""
+"""Opacity of the photo in the removed background."""
 
 
 @dataclass(frozen=True)
 class DoubtedPhoto:
-    """A photo: its number in the ledger, why it was rejected, and the digest of the cut-out beside that, None where none is.
+    """A photo with its ledger number, reason of rejection, and the sha256 of its stored matte (None if there is none).
 
-    ``place`` is that of one of several photos of a thing, from 0; None of a photo by itself.
+    ``place`` is the index, from 0, among several photos of an object; None for a single photo.
     """
 
     twin_id: str
@@ -54,17 +54,17 @@ class DoubtedPhoto:
 
     @property
     def key(self) -> str:
-        """The name of this photo alone: the twin's id, for one of several photos with the photo's number, counted from 1."""
+        """Unique name of this photo: the twin id, for one of several photos followed by the photo's number, counted from 1."""
         return self.twin_id if self.place is None else f"{self.twin_id}-{self.place + 1}"
 
     @property
     def file(self) -> Path:
-        """The photo's file."""
+        """The photo file."""
         return Path(self.item.files[self.place or 0])
 
     @property
     def title(self) -> str:
-        """The title of its item; for one of several photos the name of its file, and which of them it is."""
+        """The title of its item; for one of several photos, the file name and its position."""
         if self.place is None:
             return self.item.title
         files = self.item.files
@@ -72,19 +72,19 @@ class DoubtedPhoto:
 
 
 def doubted_photos(root: DatasetRoot) -> list[DoubtedPhoto]:
-    """Return the rejected photos of a data set that have a cut-out to be looked at, in the order of its items.
+    """Return the rejected photos of a data set that have a stored matte, in item order.
 
-    Raises UsageError where it has no ledger.
+    Raises UsageError if the data set has no ledger.
     """
     return [photo for photo in photos_to_draw(root) if photo.sha256 is not None]
 
 
 def photos_to_draw(root: DatasetRoot, redraw: Iterable[str] = ()) -> list[DoubtedPhoto]:
-    """Return the photos that were rejected for their cut-out, those in which nothing was found too, in the order of the items.
+    """Return the photos rejected for their matte, including those without a foreground, in item order.
 
-    Of several photos of a thing these are the ones that were left out, where it was rejected; all, where none could be cut out.
-    ``redraw`` are beginnings of the ids of others, whose cut-outs were believed. Raises UsageError where the data set has no
-    ledger, and for an id that is no photo's there.
+    For an object with several photos that was rejected, these are the photos that could not be segmented, or all if none could.
+    ``redraw`` are id prefixes of further photos whose mattes were accepted. Raises UsageError if the data set has no ledger, and
+    for a prefix that is not that of exactly one photo.
     """
     path, found = local_ledger(root), []
     with read_ledger(path) as ledger:
@@ -101,7 +101,7 @@ def photos_to_draw(root: DatasetRoot, redraw: Iterable[str] = ()) -> list[Doubte
             continue
         try:
             record = parse_record(root.read_bytes(f"{root.twin_name(twin_id)}/{RECORD}"))
-        except (FileNotFoundError, TwinError):  # told and put right by `manitwin check`
+        except (FileNotFoundError, TwinError):  # `manitwin check` reports and repairs these
             continue
         detail = BELIEVED if record.rejection is None else record.rejection.detail
         item = Item.from_json(parse_json_object(said, f"{path}: item {number}", UsageError, file_names=True))
@@ -115,9 +115,10 @@ def photos_to_draw(root: DatasetRoot, redraw: Iterable[str] = ()) -> list[Doubte
 
 
 def write_sheets(root: DatasetRoot, photos: Sequence[DoubtedPhoto], path: Path) -> list[Path]:
-    """Draw the cut-outs on sheets of ``SHOWN``, what would be cut away in magenta; returns the files, numbered from the second.
+    """Draw the mattes on sheets of ``SHOWN`` tiles, with the background tinted magenta; return the files, numbered from the
+    second.
 
-    Raises UsageError where there is none.
+    Raises UsageError if there are no photos.
     """
     if not photos:
         raise UsageError(f"{root.url}: has no doubtful cut-out to draw")
@@ -138,16 +139,16 @@ def confirm(
     jobs: int | None = None,
     **options: Unpack[RunOptions],
 ) -> tuple[list[DoubtedPhoto], RunReport]:
-    """Build the photos whose cut-outs an ``annotator`` has looked at and found right; return them, and what the run did.
+    """Build the photos whose mattes an ``annotator`` has confirmed; return the photos and the run report.
 
-    ``twin_ids`` may be shortened to any beginning that only one of them has. Raises UsageError naming those that have no doubted
-    cut-out, before anything is written, and where another run is at work there.
+    ``twin_ids`` may be unique prefixes. Raises UsageError, before anything is written, for ids without a doubted matte, and if
+    another run is active on the data set.
     """
     chosen = _chosen(root, doubted_photos(root), twin_ids)
     for photo in chosen:
         amendments = read_amendments(root, photo.twin_id)
         said = amendments.setdefault(PhotoStage.name, {})
-        said.pop(DRAWN, None)  # an outline that was drawn before goes before any cut-out
+        said.pop(DRAWN, None)  # an outline drawn earlier would take precedence over the matte
         picture = root.read_bytes(f"{root.twin_name(photo.twin_id)}/{CUTOUT}", UsageError)
         said[CONFIRMED] = confirmation(picture, f"{HUMAN}{annotator}")
         write_amendments(root, photo.twin_id, amendments)
@@ -161,7 +162,7 @@ def _chosen(root: DatasetRoot, photos: Sequence[DoubtedPhoto], twin_ids: Iterabl
 
 
 def _only(root: DatasetRoot, begun: str, twin_ids: Sequence[str], none: str) -> str:
-    """Return the one id that begins so; raises UsageError where it is none or several."""
+    """Return the one id with a prefix; raises UsageError if there is none or several."""
     alike = [each for each in twin_ids if begun and each.startswith(begun)]
     if len(alike) != 1:
         why = none if not alike else f"{len(alike)} photos match"
@@ -170,7 +171,7 @@ def _only(root: DatasetRoot, begun: str, twin_ids: Sequence[str], none: str) -> 
 
 
 def _tile(root: DatasetRoot, twin_id: str) -> np.ndarray:
-    """Return a cut-out ``(TILE_PX, TILE_PX, 3) uint8``, its surroundings dimmed and tinted."""
+    """Return a matte tile ``(TILE_PX, TILE_PX, 3) uint8`` with dimmed and tinted background."""
     name = f"{root.twin_name(twin_id)}/{CUTOUT}"
     picture = Image.open(io.BytesIO(root.read_bytes(name, UsageError))).convert("RGBA")
     rgba = reduced(np.asarray(picture), TILE_PX).astype(float)

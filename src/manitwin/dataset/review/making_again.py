@@ -1,4 +1,4 @@
-"""Items that people have amended are opened again, and made by the configuration of their data set."""
+"""Rebuild of amended items with the configuration of their data set."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from manitwin.twin.dataset_root import DatasetRoot
 def made_again(
     root: DatasetRoot, items: Iterable[tuple[int, Item]], jobs: int | None = None, **options: Unpack[RunOptions]
 ) -> RunReport:
-    """Make items, given with their numbers in the ledger, again from the first stage whose amendment has changed.
+    """Rebuild items, given with their ledger numbers, from the first stage whose amendment has changed.
 
-    Raises UsageError where another run is at work there.
+    Raises UsageError if another run is active on the data set.
     """
     numbered = list(items)
     ledger = Ledger(local_ledger(root))

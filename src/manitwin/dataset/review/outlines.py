@@ -1,4 +1,4 @@
-"""``manitwin review cutouts --draw``: people draw outlines of things whose cut-outs were doubted, and say what these are."""
+"""``manitwin review cutouts --draw``: draw object outlines where the matte is doubted, and state names and sizes."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ from manitwin.twin.dataset_root import DatasetRoot
 
 
 class OutlineSession:
-    """The photos of a data set that ``photos_to_draw`` returns, what each shows, and what ``annotator`` draws and says of them.
+    """The photos of ``photos_to_draw``, their pictures, and the outlines and statements of ``annotator``.
 
-    What is kept is in the data set's amendments at once; ``build`` makes the twins. Photos go by their ``key``. Raises UsageError
-    as ``photos_to_draw`` does.
+    Outlines and statements are stored immediately in the data set's amendments; ``build`` builds the twins. Photos are identified
+    by their ``key``. Raises UsageError as ``photos_to_draw`` does.
     """
 
     def __init__(self, root: DatasetRoot, annotator: str, redraw: Iterable[str] = ()):
@@ -58,49 +58,51 @@ class OutlineSession:
 
     @property
     def kept(self) -> tuple[str, ...]:
-        """The photos whose outlines were kept, in that order."""
+        """Keys of the photos whose outlines were stored, in order."""
         return tuple(self._kept)
 
     @property
     def said(self) -> tuple[str, ...]:
-        """The ids of the twins whose name or size was said anew, in that order."""
+        """Ids of the twins whose name or size was changed, in order."""
         return tuple(self._said)
 
     def photo(self, key: str) -> DoubtedPhoto:
-        """Return a doubted photo; raises UsageError where there is none of this key."""
+        """Return the photo with a key; raises UsageError if there is none."""
         if key not in self.photos:
             raise UsageError(f"{key}: not a photo with a doubtful cut-out; reload the list")
         return self.photos[key]
 
     def words(self, key: str) -> Words:
-        """Return what is said of the photo's thing now."""
+        """Return the current name and size statements on the photo's object."""
         photo = self.photo(key)
         return words_of(photo.item, read_amendments(self.root, photo.twin_id))
 
     def picture(self, key: str) -> bytes:
-        """Return what is looked at of a photo, as a WebP file."""
+        """Return the displayed picture of a photo as a WebP file."""
         encoded = io.BytesIO()
         Image.fromarray(self._rgba(key)[..., :3]).save(encoded, "WEBP", quality=QUALITY, method=4)
         return encoded.getvalue()
 
     def mask(self, key: str) -> bytes:
-        """Return its outline as a PNG file of the same size, white where the thing is: what was drawn, else what is doubted."""
+        """Return the current mask as a PNG file of the picture's size, white on the object: the drawn outline, else the doubted
+        matte.
+        """
         photo, rgba = self.photo(key), self._rgba(key)
         drawn = drawn_outline(read_amendments(self.root, photo.twin_id).get(PhotoStage.name, {}), key, photo.place)
         same = drawn is not None and drawn.mask.shape == rgba.shape[:2]
         return _png(drawn.mask if drawn is not None and same else rgba[..., 3] > 127)
 
     def fitted(self, key: str, png: bytes) -> bytes:
-        """Return an outline (PNG) moved onto edges near it, as PNG; raises UsageError for what is no outline of the photo."""
+        """Return an outline mask (PNG) snapped to nearby image edges, as PNG; raises UsageError for an invalid mask."""
         rgba = self._rgba(key)
-        with self._lock:  # OpenCV's random numbers are the process's
+        with self._lock:  # OpenCV's random number generator is shared by the process
             return _png(fit_outline(rgba[..., :3], self._mask(png, rgba)))
 
     def keep(self, key: str, png: bytes | None, name: object = None, longest_side_cm: object = None) -> None:
-        """Keep an outline (PNG), a name and a longest side (cm) for every later build; what is None stays as it is.
+        """Store an outline mask (PNG), a name and a longest side (cm) for all later builds; None leaves a value unchanged.
 
-        Raises UsageError, and keeps nothing, where no one thing can be cut out by the outline, for what is no name or length, and
-        where the picture is looked at otherwise under the name.
+        Raises UsageError, and stores nothing, if the outline does not segment a single object, if the name or length is invalid,
+        or if the name changes which part of the picture is used.
         """
         photo, source = self.photo(key), f"{HUMAN}{self.annotator}"
         drawn = None if png is None else self._drawn(key, png, source)
@@ -127,7 +129,7 @@ class OutlineSession:
                 self._kept[key] = None
 
     def build(self, *, jobs: int | None = None, **options: Unpack[RunOptions]) -> RunReport:
-        """Build what was drawn or said anew; raises UsageError where another run is at work there."""
+        """Build the twins with new outlines or statements; raises UsageError if another run is active on the data set."""
         by_twin = {photo.twin_id: photo for photo in self.photos.values()}
         changed = dict.fromkeys((*(self.photos[key].twin_id for key in self._kept), *self._said))
         chosen = [by_twin[twin_id] for twin_id in changed]
@@ -150,7 +152,7 @@ class OutlineSession:
         return drawn
 
     def _require_same_picture(self, photo: DoubtedPhoto, name: str, amendments: Amendments) -> None:
-        """Raise UsageError where an outline is of another part of the picture than is looked at under a name."""
+        """Raise UsageError if an outline refers to another part of the picture than is used under a name."""
         drawn = drawn_outline(amendments.get(PhotoStage.name, {}), photo.key, photo.place)
         if drawn is None:
             return
@@ -185,9 +187,10 @@ class OutlineSession:
 
 
 def _seen_again(photo: DoubtedPhoto, name: str, settings: MattingConfig) -> np.ndarray:
-    """Return a photo ``(H, W, 4) uint8`` as ``shown_cutout`` would show it, cut out without more networks, empty if that fails.
+    """Return a photo ``(H, W, 4) uint8`` as ``shown_cutout`` would: segmented without further networks, with zero alpha on
+    failure.
 
-    Raises UsageError where the photo cannot be read any more.
+    Raises UsageError if the photo can no longer be read.
     """
     item, stage = photo.item, PhotoStage(settings)
     mask, box_px = masks_of(item)[photo.place or 0], as_box(item.box_px)
@@ -202,7 +205,7 @@ def _seen_again(photo: DoubtedPhoto, name: str, settings: MattingConfig) -> np.n
 
 
 def _pixels(photo: DoubtedPhoto, name: str | None, settings: MattingConfig) -> np.ndarray:
-    """Return what is looked at of a photo of what a person calls ``name``: ``(H, W, 3 or 4) uint8``; raises UsageError."""
+    """Return the used part ``(H, W, 3 or 4) uint8`` of a photo of an object named ``name``; raises UsageError."""
     mask, box_px = masks_of(photo.item)[photo.place or 0], as_box(photo.item.box_px)
     try:
         return pixels_of_photo(photo.file, name or None, settings, mask=mask, box_px=box_px).given.pixels

@@ -1,4 +1,4 @@
-"""Which of several photos of one thing were not cut out, by what the photo stage left in the data set's work."""
+"""Photos of a multi-photo object that were not segmented, as recorded in the stored result of the photo stage."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from manitwin.twin.store import WORK
 
 
 class PhotosLeftOut:
-    """The photos of a data set's groups that its configuration leaves out."""
+    """The photos that a data set's configuration leaves out of its multi-photo items."""
 
     def __init__(self, root: DatasetRoot):
         self._root = root
 
     def of(self, twin_id: str, item: Item) -> list[int]:
-        """Return the places, from 0, of the photos of a thing that were left out where others were cut out.
+        """Return the indices, from 0, of an object's photos that were left out while others were segmented.
 
-        Empty where all or none were cut out, and where the stage's result is not kept here, or is of another version. Raises
-        UsageError where the data set's networks cannot be found.
+        Empty if all or none were segmented, and if the stage's result is not stored here or is of another version. Raises
+        UsageError if the data set's networks cannot be found.
         """
         if self._root.local is None:
             return []

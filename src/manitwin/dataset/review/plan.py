@@ -1,4 +1,4 @@
-"""A sample of a data set is drawn and kept, and shared among annotators."""
+"""Drawing of a review sample, and its distribution to annotators as forms."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from manitwin.twin.dataset_root import DatasetRoot
 
 
 def draw_plan(dataset: str, size: int, seed: int, overlap: float) -> tuple[Plan, Mapping[str, tuple[int, int]]]:
-    """Draw a sample and keep it as the one that is reviewed; returns it, and of each category (in the sample, in all).
+    """Draw and store the sample to review; return it with, per category, the number of twins in the sample and in total.
 
-    Raises UsageError where the data set has no index or no accepted twins.
+    Raises UsageError if the data set has no index or no accepted twins.
     """
     root = DatasetRoot(dataset)
     path, twins = reviews_path(root), listed_twins(Index(root))
@@ -34,7 +34,7 @@ def draw_plan(dataset: str, size: int, seed: int, overlap: float) -> tuple[Plan,
 
 
 def write_forms(dataset: str, plan: Plan, form: Path | None, annotators: Sequence[str]) -> list[tuple[Path, int]]:
-    """Write what each annotator is to judge as a form of their own, beside ``form``; returns the files with their rows."""
+    """Write the form of each annotator beside ``form``; return the files with their numbers of rows."""
     if form is None:
         return []
     if form.suffix != ".csv":
@@ -54,7 +54,7 @@ def write_forms(dataset: str, plan: Plan, form: Path | None, annotators: Sequenc
 
 
 def require_annotator(name: str) -> str:
-    """Return an annotator's name; raises UsageError for one that is none."""
+    """Return a valid annotator name; raises UsageError for an invalid one."""
     try:
         return str(TypeAdapter(AnnotatorName).validate_python(name))
     except ValidationError as error:

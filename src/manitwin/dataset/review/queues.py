@@ -1,4 +1,4 @@
-"""Who judges what next: queues by annotator, a share of the twins judged by several of them."""
+"""Annotator queues: who judges which twin next, with a share of the twins judged by several annotators."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 Done = Mapping[str, Collection[str]]
-"""The annotators who have judged a twin as it is now, by its id."""
+"""The annotators who have judged the current revision of a twin, by twin id."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A sample in its order, and how much of it ``raters`` annotators judge independently: the share ``overlap``."""
+    """A sample in review order. A share ``overlap`` of it is judged independently by ``raters`` annotators."""
 
     twins: tuple[str, ...]
     seed: int
@@ -20,13 +20,14 @@ class Plan:
     raters: int = 2
 
     def wanted(self, twin_id: str) -> int:
-        """Return how many annotators a twin is judged by: a draw of the seed, whatever else is in the sample."""
+        """Return how many annotators judge a twin: drawn by the seed, independently of the other twins in the sample."""
         return self.raters if _share(self.seed, twin_id, "overlap") < self.overlap else 1
 
     def assigned(self, twin_id: str, annotators: Collection[str]) -> tuple[str, ...]:
-        """Return whose a twin is: those with the highest hashes (rendezvous hashing, Thaler and Ravishankar 1998).
+        """Return the annotators assigned to a twin: those with the highest hashes (rendezvous hashing, Thaler and Ravishankar
+        1998).
 
-        An annotator who joins takes an even share from all others, and moves nothing between them.
+        A new annotator takes an even share from all others; nothing moves between existing annotators.
         """
         ranked = sorted(annotators, key=lambda name: (_share(self.seed, twin_id, f"rater {name}"), name), reverse=True)
         return tuple(ranked[: self.wanted(twin_id)])
@@ -35,7 +36,8 @@ class Plan:
 def queue_of(annotator: str, plan: Plan, annotators: Sequence[str], done: Done) -> list[str]:
     """Return the ids that an annotator is to judge, in order.
 
-    First their own; then, from the end, those of others that lack verdicts, so that nobody is waited for.
+    The annotator's own twins come first, then twins of other annotators that still lack verdicts, in reverse order, so that slow
+    annotators block nobody.
     """
     own, lacking = list[str](), list[str]()
     for twin_id in plan.twins:
@@ -47,7 +49,7 @@ def queue_of(annotator: str, plan: Plan, annotators: Sequence[str], done: Done) 
 
 
 def share_of(annotator: str, plan: Plan, annotators: Sequence[str], done: Done) -> list[str]:
-    """Return what of an annotator's queue is their own; where that is done, what others have left."""
+    """Return the annotator's own part of the queue; once it is done, what others have left."""
     queue = queue_of(annotator, plan, annotators, done)
     return [each for each in queue if annotator in plan.assigned(each, annotators)] or queue
 

@@ -1,4 +1,4 @@
-"""``manitwin review report``: what the verdicts say of a data set, beside what the paper says of its own."""
+"""``manitwin review report``: annotation accuracy of a data set from its verdicts, beside the figures of the paper."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SHOWN = 20
 
 
 def shown_correction(value: object) -> str:
-    """Return what is true instead as a person reads it: a quantity with the interval that its annotator is sure of."""
+    """Return a corrected value as text; a quantity with the annotator's interval."""
     if isinstance(value, dict):
         return f"{value['value']:g} ({value['low']:g} to {value['high']:g})"
     return str(value)
@@ -37,7 +37,7 @@ def shown_correction(value: object) -> str:
 
 @dataclass(frozen=True)
 class Disagreement:
-    """A twin of which an annotator says that what was given is wrong: with the prompt that asked for it, and its pictures."""
+    """A twin with an annotation judged wrong, with the prompt that produced the annotation and the twin's pictures."""
 
     twin_id: str
     dimension: Dimension
@@ -50,11 +50,11 @@ class Disagreement:
 
 @dataclass(frozen=True)
 class ReviewReport:
-    """What the verdicts on the twins as they are now say.
+    """Results of the verdicts on the current revisions of twins.
 
-    ``sample`` is the number of twins in the sample, of which ``reviewed`` have a verdict; None: none was drawn, and all verdicts
-    count. ``outside`` counts reviews of twins that the sample has not, ``outdated`` those of twins that were built anew since.
-    ``disputed`` are twins on which annotators contradict each other, by dimension.
+    ``sample`` is the size of the sample, of which ``reviewed`` twins have a verdict; None if no sample was drawn and all verdicts
+    count. ``outside`` counts reviews of twins outside the sample, ``outdated`` those of earlier revisions. ``disputed`` lists,
+    per dimension, the twins on which annotators contradict each other.
     """
 
     dataset: str
@@ -70,7 +70,7 @@ class ReviewReport:
     disagreements: list[Disagreement]
 
     def lines(self) -> list[str]:
-        """Return the report for a person."""
+        """Return the report as lines of text."""
         of_sample = f" of a sample of {self.sample}" if self.sample is not None else ""
         lines = [f"{self.reviewed} twins{of_sample} reviewed, in {self.reviews} reviews"]
         if self.outside:
@@ -117,7 +117,7 @@ class ReviewReport:
 
 
 def review_report(dataset: str) -> ReviewReport:
-    """Return the report on a data set; raises UsageError where there is no index, or nothing was reviewed."""
+    """Return the report on a data set; raises UsageError if there is no index or no review."""
     root = DatasetRoot(dataset)
     with ReviewStore(reviews_path(root), make=False) as store:
         stored, plan, undone, annotators = store.standing(), store.plan(), store.undone(), store.annotators()
@@ -150,7 +150,7 @@ def review_report(dataset: str) -> ReviewReport:
 
 
 def judges(reviews: list[Stored]) -> dict[str, set[str]]:
-    """Return the annotators of each twin."""
+    """Return the annotators who reviewed each twin."""
     found: dict[str, set[str]] = {}
     for each in reviews:
         found.setdefault(each.review.twin_id, set()).add(each.review.annotator)
@@ -171,7 +171,7 @@ def _disputed(reviews: list[Stored]) -> dict[Dimension, list[str]]:
 
 
 def _disagreements(reviews: list[Stored], root: DatasetRoot) -> list[Disagreement]:
-    """Return what most annotators of a twin called wrong, by prompt: for whoever edits the prompts."""
+    """Return the annotations that a majority judged wrong, sorted by prompt, to help improve the prompts."""
     by_place: dict[tuple[str, Dimension], list[Stored]] = {}
     for each in reviews:
         for dimension in each.review.answers:
@@ -226,7 +226,9 @@ def _some(twin_ids: list[str]) -> str:
 
 
 def export_verdicts(dataset: str, path: Path) -> int:
-    """Write all verdicts that stand, also those on earlier revisions, by the file's suffix; returns the number of rows."""
+    """Write all standing verdicts, including those on earlier revisions, in the format of the suffix; return the
+    number of rows.
+    """
     with ReviewStore(reviews_path(DatasetRoot(dataset)), make=False) as store:
         table = table_of(store.standing())
     write_verdicts(table, path)

@@ -1,4 +1,4 @@
-"""What a person says of a photo's thing while its outline is drawn: its name and longest side, read, checked and kept."""
+"""Name and longest side of an object as stated while its outline is drawn: parsing, validation and storage."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from manitwin.pipeline.stated_size import COLUMN, stated_size_m
 from manitwin.twin.record_values import Estimate
 
 _DIGITS = 6
-"""Of a length in a field: what is typed no finer is the same length."""
+"""Significant digits of a typed length; lengths that agree in them are equal."""
 _SHOWN_CHARACTERS = 60
 
 
 @dataclass(frozen=True)
 class Words:
-    """A thing's name, and its longest side (cm) as it is typed; '' where nobody says it."""
+    """An object's name and its longest side (cm) as typed; '' if not stated."""
 
     name: str = ""
     longest_side_cm: str = ""
 
 
 def given_words(item: Item) -> Words:
-    """Return what was said of an input when it was given."""
+    """Return the statements that the input was given with."""
     return Words(item.name or "", "" if item.longest_side_m is None else _centimetres(item.longest_side_m))
 
 
 def words_of(item: Item, amendments: Amendments) -> Words:
-    """Return what is said of an input now: what people have said since goes before what it was given with."""
+    """Return the current statements on an input; later amendments take precedence over the input's own."""
     given = given_words(item)
     name = _first(amendments, STAGES[CATEGORY], CATEGORY)
     if name is None:
@@ -51,7 +51,7 @@ def words_of(item: Item, amendments: Amendments) -> Words:
 
 
 def read_name(typed: object) -> str:
-    """Return a name as it was typed, '' where nothing was; raises UsageError for what a manifest's column takes for none."""
+    """Return a typed name, '' if empty; raises UsageError for a name that a manifest would not accept."""
     if not isinstance(typed, str):
         raise UsageError("a name is a text; send an empty text for unknown")
     name = typed.strip()
@@ -62,7 +62,7 @@ def read_name(typed: object) -> str:
 
 
 def read_side_cm(typed: object, gate: GateConfig) -> str:
-    """Return a longest side (cm) as it was typed, '' where nothing was; raises UsageError for what ``gate`` takes no thing of."""
+    """Return a typed longest side (cm), '' if empty; raises UsageError for a length outside the limits of ``gate``."""
     if not isinstance(typed, str):
         raise UsageError("a longest side is a text; send an empty text for unknown")
     number = typed.strip().replace(",", ".")
@@ -82,10 +82,10 @@ def read_side_cm(typed: object, gate: GateConfig) -> str:
 
 
 def with_words(amendments: Amendments, item: Item, words: Words, source: str) -> Amendments:
-    """Return an input's amendments with what ``source`` says of it; what is not said anew stays as it is.
+    """Return an input's amendments with statements by ``source``; unchanged statements stay as they are.
 
-    An empty field, or what the input was given with, takes back what people have said since. Raises UsageError for a length
-    where a unit was stated, as a manifest's row does.
+    An empty field, or the value that the input was given with, removes the amendment. Raises UsageError for a length if a unit
+    was stated, as for a manifest row.
     """
     after: dict[str, dict[str, Any]] = {stage: dict(said) for stage, said in amendments.items()}
     before, given = words_of(item, amendments), given_words(item)
@@ -106,12 +106,12 @@ def with_words(amendments: Amendments, item: Item, words: Words, source: str) ->
 
 
 def known_names() -> list[str]:
-    """Return the categories that the priors know, in the order of the alphabet."""
+    """Return the categories of the priors in alphabetical order."""
     return sorted(prior.category for prior in load_priors().values() if prior.category != "unknown")
 
 
 def name_remark(name: str) -> str:
-    """Say what is known of a name: how long such things are, or the nearest names where the priors know none; '' of no name."""
+    """Return a remark on a name: the usual size of such objects, or the nearest known names; '' for an empty name."""
     if not name:
         return ""
     prior = lookup(name)

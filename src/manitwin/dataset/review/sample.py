@@ -1,4 +1,4 @@
-"""A sample that stands for a data set: every twin as likely as any other, and every stratum with its share."""
+"""Representative sample of a data set: equal inclusion probabilities, proportional over the strata."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from manitwin.dataset.index.query import Index
 from manitwin.errors import UsageError
 
 SIZES_M = (0.05, 0.1, 0.2, 0.4)
-"""Bounds of the strata of size, by the longest side: each holds things twice as long as the one before."""
+"""Bounds of the size strata in metres (longest side); each class spans a factor of two."""
 COLUMNS = ("twin_id", "category", "longest_m", "kind")
 
 
 @dataclass(frozen=True)
 class Listed:
-    """A twin with what the strata are made of: category, longest side (m), kind of input; None where the index does not say."""
+    """A twin with its stratification variables: category, longest side (m), kind of input; None if the index lacks them."""
 
     twin_id: str
     category: str | None
@@ -27,7 +27,7 @@ class Listed:
 
     @property
     def stratum(self) -> tuple[str, str, str]:
-        """Category, class of size and origin."""
+        """Category, size class and kind of input."""
         size = "?" if self.longest_m is None else str(int(np.searchsorted(SIZES_M, self.longest_m, side="right")))
         return self.category or "?", size, self.kind or "?"
 
@@ -39,12 +39,13 @@ def listed_twins(index: Index) -> list[Listed]:
 
 
 def stratified_sample(twins: Iterable[Listed], size: int, seed: int) -> list[str]:
-    """Return the ids of ``size`` twins (all, where there are no more), in an order that is shuffled by the seed.
+    """Return the ids of ``size`` twins (of all twins if there are fewer), shuffled by the seed.
 
-    Systematic sampling of a list that is sorted by strata (W. G. Cochran, Sampling Techniques, 3rd ed., section 8.3: implicit
-    stratification). Every twin has the probability ``size``/N, so that shares in the sample need no weights; of a stratum of
-    n twins, that lie together in the list, the sample has ``n * size/N`` rounded down or up: of every category, and within
-    it of every class of size, and of origin. Within a stratum the order is that of the seed. Same twins, size, seed: same sample.
+    Systematic sampling of a list sorted by strata (W. G. Cochran, Sampling Techniques, 3rd ed., section 8.3: implicit
+    stratification). Every twin has the inclusion probability ``size``/N, so that shares in the sample need no weights. A stratum
+    of n twins, contiguous in the list, contributes ``n * size/N`` twins, rounded down or up; this holds for every category, for
+    every size class within it, and for every kind of input. Within a stratum the seed gives the order. Equal twins, size and seed
+    give the same sample.
     """
     if size < 1:
         raise UsageError(f"a sample of {size} twins; give 1 or more")
@@ -57,7 +58,7 @@ def stratified_sample(twins: Iterable[Listed], size: int, seed: int) -> list[str
 
 
 def strata_counts(twins: Sequence[Listed], chosen: Iterable[str]) -> Mapping[str, tuple[int, int]]:
-    """Return of each category (twins in the sample, twins in all)."""
+    """Return, per category, the number of twins in the sample and in total."""
     wanted, counts = set(chosen), dict[str, tuple[int, int]]()
     for twin in twins:
         sampled, total = counts.get(twin.stratum[0], (0, 0))
@@ -66,5 +67,5 @@ def strata_counts(twins: Sequence[Listed], chosen: Iterable[str]) -> Mapping[str
 
 
 def _drawn(seed: int, twin_id: str) -> str:
-    """Return what a twin is ordered by: a number of its own that the seed gives, whatever other twins there are."""
+    """Return the sort key of a twin, determined by the seed and its id alone."""
     return hashlib.sha256(f"{seed}:{twin_id}".encode()).hexdigest()

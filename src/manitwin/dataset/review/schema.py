@@ -1,4 +1,4 @@
-"""The schema of the store of reviews as numbered steps; ``PRAGMA user_version`` says how many a file has taken."""
+"""SQLite schema of the review store as numbered migrations; ``PRAGMA user_version`` counts those that a file has."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ MIGRATIONS = (
 
 
 def migrate(connection: sqlite3.Connection, path: str) -> None:
-    """Bring a store to the newest schema; raises UsageError for one of a newer version of this package."""
+    """Migrate a store to the newest schema; raises UsageError for a store of a newer version of this package."""
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if version > len(MIGRATIONS):
         raise UsageError(of_newer_schema(path, version, len(MIGRATIONS)))

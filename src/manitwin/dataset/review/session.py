@@ -1,4 +1,4 @@
-"""A review while its server runs: the queues of the annotators, reviews confirmed and taken back. Threads may share it."""
+"""State of a running review server: annotator queues, and confirmed and withdrawn reviews. Thread-safe."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from manitwin.errors import UsageError
 from manitwin.twin.record import TwinRecord
 
 FRESH_S = 10.0
-"""How long the list of the twins' revisions is used again: a twin that is built anew may enter the queue so much later."""
+"""Seconds for which the list of twin revisions is cached; a rebuilt twin enters the queue with at most this delay."""
 
 
 class Said(BaseModel):
-    """What a page sends to confirm a review; by ``request``, an id of the page's, a review that is sent twice counts once."""
+    """Request body that confirms a review. ``request`` is an id chosen by the page, so that a repeated request counts once."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -38,7 +38,7 @@ class Said(BaseModel):
 
 @dataclass(frozen=True)
 class Progress:
-    """An annotator's progress: reviews of the sample that stand, twins left of their share, and the median time of a review."""
+    """An annotator's progress: standing reviews of the sample, twins left of their share, and the median time of a review."""
 
     reviewed: int
     left: int
@@ -58,7 +58,7 @@ class ReviewSession:
             store.add_annotator(name)
 
     def queue(self, annotator: str, after: str | None = None) -> list[str]:
-        """Return the ids of an annotator's queue; ``after`` is left for later: behind all others, until the server ends."""
+        """Return the ids of an annotator's queue. The twin ``after`` is moved to its end for the lifetime of the server."""
         queue = self._queue(annotator)
         with self._lock:
             later = self._later.setdefault(annotator, [])
@@ -68,13 +68,13 @@ class ReviewSession:
         return sorted(queue, key=lambda twin_id: places.get(twin_id, -1))
 
     def progress(self, annotator: str) -> Progress:
-        """Return how far an annotator is."""
+        """Return the progress of an annotator."""
         now, judged = self._revisions(), self.store.judged()
         done = sum(annotator in judged.get(twin_id, {}).get(now.get(twin_id, ""), ()) for twin_id in self.plan.twins)
         return Progress(done, len(self._queue(annotator, share_of)), self.store.median_seconds(annotator))
 
     def confirm(self, annotator: str, record: TwinRecord, body: Mapping[str, Any]) -> None:
-        """Store a review; raises UsageError for a ``body`` that is none, or for a twin that was built anew since it was shown."""
+        """Store a review; raises UsageError for an invalid ``body``, and for a twin that was rebuilt since it was shown."""
         try:
             said = Said.model_validate(body)
             if said.revision != record.revision:
@@ -91,7 +91,7 @@ class ReviewSession:
         self.store.add([review], [f"{annotator}:{said.request}"])
 
     def undo(self, annotator: str, request: str) -> Stored | None:
-        """Take back the last review of an annotator; None: there is none."""
+        """Withdraw the last review of an annotator and return it; None if there is none."""
         return self.store.undo(annotator, f"{annotator}:{request[:64]}")
 
     def _queue(self, annotator: str, of: Callable[..., list[str]] = queue_of) -> list[str]:

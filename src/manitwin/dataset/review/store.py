@@ -1,8 +1,9 @@
-"""The store of reviews: SQLite in which verdicts are only appended, and what was confirmed is on the disk.
+"""Review store: append-only, durable SQLite storage of verdicts.
 
-A review is one committed transaction. In write-ahead mode with ``synchronous = FULL`` a commit returns after the log was synced
-(https://sqlite.org/pragma.html#pragma_synchronous): neither a killed process nor a power cut loses it, and reports read while a
-server writes. The file must lie on a local disk: that mode needs shared memory, which network file systems have not.
+A review is one committed transaction. In write-ahead mode with ``synchronous = FULL``, a commit returns after the log was synced
+(https://sqlite.org/pragma.html#pragma_synchronous). Neither a killed process nor a power failure then loses it, and reports can
+read while a server writes. The file must be on a local disk: write-ahead mode needs shared memory, which network file systems do
+not provide.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ _LIVE = "kind = 'review' AND number NOT IN (SELECT undoes FROM events WHERE undo
 
 @dataclass(frozen=True)
 class Stored:
-    """A review with its number, which grows in time, and when (seconds since the epoch) it was confirmed."""
+    """A review with its number, which increases with time, and the time of confirmation in seconds since the epoch."""
 
     number: int
     at: float
@@ -45,7 +46,7 @@ class Stored:
 
 
 def reviews_path(root: DatasetRoot) -> Path:
-    """Return where the reviews of a data set lie; raises UsageError for a URL."""
+    """Return the path of a data set's review store; raises UsageError for a URL."""
     if root.local is None:
         raise UsageError(
             f"{root.url}: reviews are stored beside a data set on a local disk; copy the data set to a disk first"
@@ -54,9 +55,9 @@ def reviews_path(root: DatasetRoot) -> Path:
 
 
 class ReviewStore:
-    """One store, open for reading and appending; threads and processes may share it.
+    """A review store, open for reading and appending. Safe for concurrent threads and processes.
 
-    Raises UsageError where there is none and ``make`` is False, and for a file that is none or is damaged.
+    Raises UsageError if the file is missing and ``make`` is False, and if it is damaged or not a review store.
     """
 
     def __init__(self, path: Path, *, make: bool = True, now: Callable[[], float] = time.time):
@@ -88,14 +89,14 @@ class ReviewStore:
         self.close()
 
     def close(self) -> None:
-        """Close the file; what is confirmed is there already."""
+        """Close the file; confirmed reviews are already on disk."""
         with self._lock:
             self._connection.close()
 
     def add(self, reviews: Iterable[Review], requests: Iterable[str]) -> int:
-        """Append reviews, all or none, each with the sender's own id; returns how many were not there yet.
+        """Append reviews atomically, each with the sender's request id; return how many were new.
 
-        An annotator's draft of a twin ends with their review of it.
+        The annotator's draft on a reviewed twin is deleted.
         """
         added = 0
         with self._writing() as connection:
@@ -110,9 +111,10 @@ class ReviewStore:
         return added
 
     def undo(self, annotator: str, request: str) -> Stored | None:
-        """Take back the last review of an annotator that stands, by another event; it becomes their draft. None: none stands.
+        """Withdraw the last standing review of an annotator by appending an event and return it; it becomes a draft. None if none
+        stands.
 
-        Sent again, ``request`` takes back nothing more.
+        Repeating a ``request`` withdraws nothing more.
         """
         with self._writing() as connection:
             before = connection.execute("SELECT undoes FROM events WHERE request = ?", (request,)).fetchone()
@@ -132,7 +134,9 @@ class ReviewStore:
             return stored
 
     def follow(self, revisions: Mapping[str, tuple[str, str]]) -> None:
-        """Note revisions of twins that differ from the one before by nothing that is judged: what was said of that stands."""
+        """Record pairs of revisions (before, after) of twins that differ in nothing that is judged; reviews of the former stay
+        valid.
+        """
         with self._writing() as connection:
             for twin_id, (before, after) in revisions.items():
                 connection.execute(
@@ -142,9 +146,9 @@ class ReviewStore:
                 )
 
     def standing(self) -> list[Stored]:
-        """Return the last review that stands of each annotator, twin and revision, in the order of their numbers.
+        """Return the last standing review of each annotator, twin and revision, in order of their numbers.
 
-        A review is of the revision that followed the one that was seen, where ``follow`` says so.
+        The revision of a review is replaced by the last one that ``follow`` recorded as its successor.
         """
         latest = f"SELECT max(number) FROM events WHERE {_LIVE} GROUP BY annotator, twin_id, revision"
         followed, last = self.followed(), dict[tuple[str, str, str], Stored]()
@@ -156,7 +160,7 @@ class ReviewStore:
         return sorted(last.values(), key=lambda stored: stored.number)
 
     def followed(self) -> Callable[[str, str], str]:
-        """Return what tells of a twin's revision the last one that followed it."""
+        """Return a function that maps a twin id and revision to the last recorded successor of the revision."""
         known = {
             (twin, before): after
             for twin, before, after in self._select("SELECT twin_id, before, after FROM successors", ())
@@ -172,7 +176,7 @@ class ReviewStore:
         return last
 
     def of_twin(self, twin_id: str, annotator: str) -> Stored | None:
-        """Return the last review that stands of an annotator on a twin."""
+        """Return the last standing review of an annotator on a twin; None if there is none."""
         found = self._rows(
             f"{_LIVE} AND twin_id = ? AND annotator = ? ORDER BY number DESC LIMIT 1", (twin_id, annotator)
         )
@@ -183,7 +187,7 @@ class ReviewStore:
         return replace(found[0], review=said.model_copy(update={"revision": now}))
 
     def median_seconds(self, annotator: str) -> float | None:
-        """Return the median time that an annotator's reviews that stand took; None: none says how long."""
+        """Return the median duration of an annotator's standing reviews in seconds; None if no review states one."""
         rows = self._select(
             f"SELECT json_extract(body, '$.seconds') FROM events WHERE {_LIVE} AND annotator = ?", (annotator,)
         )
@@ -191,17 +195,17 @@ class ReviewStore:
         return statistics.median(told) if told else None
 
     def undone(self) -> dict[str, int]:
-        """Return how many reviews each annotator has taken back."""
+        """Return the number of withdrawn reviews per annotator."""
         rows = self._select("SELECT annotator, count(*) FROM events WHERE kind = 'undo' GROUP BY annotator", ())
         return dict(rows)
 
     def put_draft(self, annotator: str, twin_id: str, body: dict[str, Any]) -> None:
-        """Keep what an annotator has typed of a twin and not confirmed."""
+        """Store an annotator's unconfirmed input on a twin."""
         with self._writing() as connection:
             self._put_draft(connection, annotator, twin_id, body)
 
     def draft(self, annotator: str, twin_id: str) -> dict[str, Any] | None:
-        """Return what an annotator has typed of a twin and not confirmed; None where there is nothing."""
+        """Return an annotator's unconfirmed input on a twin; None if there is none."""
         rows = self._select("SELECT body FROM drafts WHERE annotator = ? AND twin_id = ?", (annotator, twin_id))
         return parse_json_object(rows[0][0], f"{self.path}: a draft", UsageError) if rows else None
 
@@ -212,7 +216,7 @@ class ReviewStore:
         )
 
     def plan(self) -> Plan | None:
-        """Return the last sample that was drawn; None: none was."""
+        """Return the last sample that was drawn; None if there is none."""
         rows = self._select("SELECT body FROM events WHERE kind = 'sample' ORDER BY number DESC LIMIT 1", ())
         if not rows:
             return None
@@ -223,7 +227,7 @@ class ReviewStore:
             raise damaged(self.path, f"a sample without {error}", _DAMAGED) from error
 
     def add_plan(self, plan: Plan) -> None:
-        """Append a sample, unless it is the last one already."""
+        """Append a sample unless it equals the last one."""
         if self.plan() == plan:
             return
         body = {"twins": list(plan.twins), "seed": plan.seed, "overlap": plan.overlap, "raters": plan.raters}
@@ -233,16 +237,16 @@ class ReviewStore:
             )
 
     def add_annotator(self, name: str) -> None:
-        """Note that somebody reviews; who is noted already stays so."""
+        """Register an annotator; no effect if already registered."""
         with self._writing() as connection:
             connection.execute("INSERT INTO annotators VALUES (?, ?) ON CONFLICT DO NOTHING", (name, self._now()))
 
     def annotators(self) -> list[str]:
-        """Return the names of all who review, sorted."""
+        """Return the sorted names of all annotators."""
         return [name for (name,) in self._select("SELECT name FROM annotators ORDER BY name", ())]
 
     def judged(self) -> dict[str, dict[str, set[str]]]:
-        """Return the annotators of the reviews that stand, by twin and revision."""
+        """Return the annotators of the standing reviews, by twin and revision."""
         found: dict[str, dict[str, set[str]]] = {}
         followed = self.followed()
         rows = self._select(f"SELECT DISTINCT twin_id, revision, annotator FROM events WHERE {_LIVE}", ())
@@ -266,7 +270,7 @@ class ReviewStore:
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        """Give a transaction that is on the disk when the block has ended well, and never was otherwise."""
+        """Provide a transaction that is durable once the block ends without an error, and is otherwise rolled back."""
         with self._lock, self._sound(), transaction(self._connection):
             yield self._connection
 

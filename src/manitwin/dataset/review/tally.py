@@ -1,4 +1,4 @@
-"""What the verdicts add up to: accuracy by dimension and by prompt version, agreement, progress."""
+"""Statistics of verdicts: accuracy by dimension and prompt version, agreement, annotator progress."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from manitwin.twin.shares import wilson_interval
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Twins by what most of their annotators answered in one dimension.
+    """Number of twins per majority answer in one dimension.
 
-    ``undecided`` are those on which as many said yes as no, or all are unsure: they count neither as right nor as wrong. The
-    interval is Wilson's at 95 %, of ``right`` among ``right + wrong``; ``share`` is None where that is nothing.
+    ``undecided`` twins have as many yes as no answers, or only "unsure"; they count neither as right nor as wrong. The interval
+    is the 95 % Wilson interval of ``right`` among ``right + wrong``; ``share`` is None if that sum is zero.
     """
 
     dimension: Dimension
@@ -30,24 +30,24 @@ class Accuracy:
 
     @property
     def share(self) -> float | None:
-        """The share of the judged twins that are right; None where none is judged."""
+        """Share of right twins among the decided ones; None if there are none."""
         judged = self.right + self.wrong
         return self.right / judged if judged else None
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The interval of ``share``, Wilson's of 95 %."""
+        """95 % Wilson interval of ``share``."""
         return wilson_interval(self.right, self.right + self.wrong)
 
     @property
     def paper(self) -> float | None:
-        """The paper's accuracy; None where it states none."""
+        """Accuracy reported in the paper; None if not reported."""
         return PAPER_ACCURACY.get(self.dimension)
 
 
 @dataclass(frozen=True)
 class Speed:
-    """An annotator's progress: reviews that stand, twins left in the queue, reviews taken back, and the median time of one."""
+    """An annotator's progress: standing reviews, twins left in the queue, withdrawn reviews, and the median time of a review."""
 
     annotator: str
     reviews: int
@@ -57,13 +57,13 @@ class Speed:
 
     @property
     def left_s(self) -> float | None:
-        """About how long the rest takes; None where no time was measured."""
+        """Estimated time for the rest in seconds; None if no time was measured."""
         return None if self.median_s is None else self.left * self.median_s
 
 
 @dataclass(frozen=True)
 class PromptVersion:
-    """How many answers on what one version of a prompt gave are yes, no and unsure, and the ids of the twins with a no."""
+    """Number of yes, no and unsure answers on annotations of one prompt version, and the ids of the twins with a no."""
 
     dimension: Dimension
     prompt: str
@@ -74,12 +74,12 @@ class PromptVersion:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The 95 % interval of the share of yes among yes and no; of answers, of which a twin may have several."""
+        """95 % Wilson interval of the share of yes among yes and no answers; a twin may have several answers."""
         return wilson_interval(self.yes, self.yes + self.no)
 
 
 def accuracies(reviews: Iterable[Stored]) -> list[Accuracy]:
-    """Return the accuracy of every dimension; ``reviews`` has at most one of an annotator on a twin."""
+    """Return the accuracy of every dimension. ``reviews`` has at most one review per annotator and twin."""
     found = list(reviews)
     return [_accuracy(dimension, found) for dimension in DIMENSIONS]
 
@@ -96,7 +96,7 @@ def _accuracy(dimension: Dimension, reviews: Sequence[Stored]) -> Accuracy:
 
 
 def majority(answers: Iterable[str]) -> str:
-    """Return what more said of 'yes' and 'no'; 'unsure' where that is neither."""
+    """Return the majority of 'yes' and 'no' answers; 'unsure' for a tie."""
     counts = Counter(answers)
     if counts["yes"] == counts["no"]:
         return "unsure"
@@ -104,7 +104,7 @@ def majority(answers: Iterable[str]) -> str:
 
 
 def speeds(reviews: Iterable[Stored], queues: Mapping[str, Collection[str]], undone: Mapping[str, int]) -> list[Speed]:
-    """Return every annotator's progress, sorted by name: of those who have a queue, have reviewed, or took back."""
+    """Return the progress of every annotator with a queue, reviews or withdrawals, sorted by name."""
     counts: Counter[str] = Counter()
     seconds: dict[str, list[float]] = {}
     for review in (stored.review for stored in reviews):
@@ -122,7 +122,7 @@ def speeds(reviews: Iterable[Stored], queues: Mapping[str, Collection[str]], und
 
 
 def prompt_versions(reviews: Iterable[Stored]) -> list[PromptVersion]:
-    """Return what was said of each prompt version, by dimension, the one with most disagreement first."""
+    """Return the answers per prompt version, by dimension, those with most disagreement first."""
     answers: dict[tuple[Dimension, str], Counter[str]] = {}
     disagreeing: dict[tuple[Dimension, str], dict[str, None]] = {}
     for review in (stored.review for stored in reviews):

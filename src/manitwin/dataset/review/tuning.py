@@ -1,7 +1,7 @@
-"""Thresholds that would have agreed best with the verdicts: what accepts a twin, tightened where people say that it was wrong.
+"""Proposals for stricter acceptance thresholds that agree best with the verdicts on accepted twins.
 
-Only accepted twins are reviewed, so that nothing tells whether a threshold refuses too much: one can be tightened here, and is
-never loosened. A proposal has to hold on twins that it was not chosen on.
+Since only accepted twins are reviewed, the verdicts cannot show that a threshold rejects too much: thresholds are only tightened,
+never loosened. A proposal must hold on twins that it was not chosen on (cross-validation).
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from manitwin.twin.record import TwinRecord
 
 FOLDS = 5
 LEAST_OF_EACH = 10
-"""Twins called right, and called wrong, from which a threshold is chosen."""
+"""Minimum number of twins judged right, and of twins judged wrong, to choose a threshold."""
 SURE = 0.05
-"""The chance that a proposal is by luck, at most: of all thresholds together (Bonferroni)."""
+"""Significance level of all proposals together (Bonferroni correction)."""
 
 
 @dataclass(frozen=True)
 class Tunable:
-    """A threshold of the configuration: ``value`` is what it was compared with, None where a twin does not say.
+    """A threshold of the configuration. ``value`` returns the compared quantity of a twin, None if the record lacks it.
 
-    ``at_least``: what is below it is refused; else what is above.
+    ``at_least``: smaller values are rejected, else larger ones.
     """
 
     section: str
@@ -50,11 +50,11 @@ class Tunable:
 
     @property
     def key(self) -> str:
-        """The setting's full name."""
+        """Full name of the setting."""
         return f"{self.section}.{self.name}"
 
     def current(self, configuration: Mapping[str, Any]) -> float:
-        """Return the threshold of a data set's configuration, else the default."""
+        """Return the threshold in a data set's configuration, else the default."""
         section = configuration.get(self.section)
         said = section.get(self.name) if isinstance(section, Mapping) else None
         if isinstance(said, (int, float)) and not isinstance(said, bool):
@@ -64,11 +64,11 @@ class Tunable:
 
 @dataclass(frozen=True)
 class Tuned:
-    """What the verdicts say of one threshold, as counts of twins.
+    """Results for one threshold, as counts of twins.
 
-    ``best`` agrees most with all verdicts; the held-out counts are of thresholds that were chosen without the twins that they
-    judge: ``mended`` are called wrong and refused, ``lost`` are called right and refused. ``chance`` is that of as many mended
-    and lost twins by luck (exact sign test). ``why_not`` says why it is not proposed, None: it is.
+    ``best`` agrees most with all verdicts. The held-out counts refer to thresholds chosen without the twins that they are applied
+    to: ``mended`` twins are judged wrong and rejected, ``lost`` twins are judged right and rejected. ``chance`` is the p-value of
+    the exact sign test on these counts. ``why_not`` says why the threshold is not proposed; None if it is.
     """
 
     key: str
@@ -86,16 +86,16 @@ class Tuned:
 
     @property
     def agreement_now(self) -> float:
-        """The share of the verdicts that acceptance, as it is, agrees with."""
+        """Share of verdicts that agree with the current acceptance."""
         return self.right / max(self.right + self.wrong, 1)
 
     @property
     def agreement_held_out(self) -> float:
-        """The same with the threshold chosen on other twins."""
+        """Cross-validated share of verdicts that agree with the chosen threshold."""
         return (self.right - self.lost + self.mended) / max(self.right + self.wrong, 1)
 
     def line(self) -> str:
-        """Return it for a person."""
+        """Return the result as a line of text."""
         judged = self.right + self.wrong
         if self.best is None:
             return f"{self.key} = {self.current:g}: {self.why_not} ({self.right} right, {self.wrong} wrong in {self.dimension})"
@@ -108,9 +108,9 @@ class Tuned:
 
 
 def tune_dataset(dataset: str) -> list[Tuned]:
-    """Return what the verdicts on a data set's twins, as they are now, say of each threshold.
+    """Return the result for each threshold from the verdicts on the current revisions of a data set's twins.
 
-    Raises UsageError where there is no index, or nothing was reviewed.
+    Raises UsageError if there is no index or no current review.
     """
     root = DatasetRoot(dataset)
     with ReviewStore(reviews_path(root), make=False) as store:
@@ -129,7 +129,7 @@ def tune_dataset(dataset: str) -> list[Tuned]:
 
 
 def tune(reviews: Iterable[Stored], records: Mapping[str, TwinRecord], configuration: Mapping[str, Any]) -> list[Tuned]:
-    """Return what the verdicts say of each threshold; ``records`` are the accepted twins that were reviewed, by id."""
+    """Return the result for each threshold; ``records`` are the reviewed accepted twins by id."""
     answers: dict[tuple[str, Dimension], list[str]] = {}
     for review in (each.review for each in reviews):
         for dimension, answer in review.answers.items():
@@ -139,7 +139,7 @@ def tune(reviews: Iterable[Stored], records: Mapping[str, TwinRecord], configura
 
 
 def toml_of(tuned: Sequence[Tuned]) -> str:
-    """Return the proposals as a configuration, with what speaks for each; empty where there is none."""
+    """Return the proposals as TOML configuration with their evidence as comments; empty if there are none."""
     sections: dict[str, list[str]] = {}
     for each in tuned:
         if each.why_not is None and each.best is not None:
@@ -149,9 +149,9 @@ def toml_of(tuned: Sequence[Tuned]) -> str:
 
 
 def best_threshold(values: np.ndarray, right: np.ndarray, current: float, at_least: bool) -> float:
-    """Return the threshold that agrees with most verdicts: between two values, of equally good ones the nearest to ``current``.
+    """Return the threshold that agrees with most verdicts, midway between two values; ties go to the one nearest to ``current``.
 
-    ``values (N,)`` and ``right (N,) bool``; only thresholds as strict as ``current`` are looked at.
+    ``values (N,)`` and ``right (N,) bool``. Only thresholds at least as strict as ``current`` are considered.
     """
     distinct = np.unique(values)
     between = (distinct[1:] + distinct[:-1]) / 2
@@ -164,7 +164,9 @@ def best_threshold(values: np.ndarray, right: np.ndarray, current: float, at_lea
 
 
 def sign_test(better: int, worse: int) -> float:
-    """Return the chance of at least so many better among all that changed, were better and worse equally likely."""
+    """Return the probability of at least ``better`` improvements among all changes if improvement and deterioration are equally
+    likely (one-sided exact sign test).
+    """
     changed = better + worse
     return sum(comb(changed, count) for count in range(better, changed + 1)) / 2**changed
 
@@ -189,7 +191,7 @@ def _tuned(
     refused = _refused(values, best, tunable.at_least)
     held_out = np.zeros(len(values), bool)
     fold = np.empty(len(values), int)
-    for said in (True, False):  # as many of each answer in every fold
+    for said in (True, False):  # stratified folds: equally many of each answer
         fold[right == said] = np.arange((right == said).sum()) % FOLDS
     for number in range(FOLDS):
         others = fold != number
@@ -232,7 +234,7 @@ def _named_by_classifier(record: TwinRecord, current: float) -> float | None:
 
 
 def _beyond(value: float, usual: Interval) -> float:
-    """Return the factor by which a value is outside of its usual interval; 1 inside."""
+    """Return the factor by which a value lies outside its usual interval; 1 inside."""
     return max(usual.low / value, value / usual.high, 1.0)
 
 
@@ -262,4 +264,4 @@ TUNABLES = (
     Tunable("physical", "mass_margin", "physical", False, _mass_beyond),
     Tunable("grasps", "association_radius_m", "grasp", False, _radius),
 )
-"""The thresholds of a configuration that decide of a twin by a number that it keeps."""
+"""Configuration thresholds that accept or reject a twin by a number stored in its record."""

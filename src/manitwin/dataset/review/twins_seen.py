@@ -1,4 +1,4 @@
-"""What a verdict is about: a twin's revision, what it says in each dimension, who said so, and the pictures."""
+"""The subject of a verdict: a twin's revision, its annotations per dimension, their origin, and its pictures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _CARD = "card.png"
 
 
 def read_twin(root: DatasetRoot, twin_id: str) -> TwinRecord:
-    """Return a twin's record; raises UsageError where the data set has no accepted twin of this id."""
+    """Return a twin's record; raises UsageError if the data set has no accepted twin of this id."""
     if not root.exists(f"{root.twin_name(twin_id)}/{RECORD}"):
         raise UsageError(f"{twin_id}: not a twin of {root.url}; `manitwin query {root.url} --format ids` lists them")
     with local_files(root, twin_id, (RECORD,)) as folder:
@@ -33,7 +33,7 @@ def revisions(index: Index) -> dict[str, str]:
 
 
 def prompts_of(record: TwinRecord) -> dict[Dimension, str]:
-    """Return of each dimension who gave what is judged: 'BACKEND, MODEL, prompt NAME vN DIGEST'."""
+    """Return the origin of the annotations of each dimension: 'BACKEND, MODEL, prompt NAME vN DIGEST'."""
     found: dict[Dimension, str] = {}
     for dimension in DIMENSIONS:
         stage = record.provenance.stages.get(DECIDING_STAGE[dimension])
@@ -43,7 +43,7 @@ def prompts_of(record: TwinRecord) -> dict[Dimension, str]:
 
 
 def said_of(record: TwinRecord, dimension: Dimension, *, blind: bool = False) -> str:
-    """Return in one line what a twin says of itself in a dimension; ``blind``: without the interval of its mass."""
+    """Return the annotations of a twin in a dimension as one line of text. ``blind`` omits the interval of the mass."""
     language, physical, points, grasps = record.language, record.physical, record.points, record.grasps
     if dimension == "category" and language is not None:
         return language.category
@@ -66,7 +66,7 @@ def said_of(record: TwinRecord, dimension: Dimension, *, blind: bool = False) ->
 
 
 def check_corrections(record: TwinRecord, corrections: Corrections) -> None:
-    """Raise UsageError where corrections name a point or a candidate that a twin has not, or move two points to one."""
+    """Raise UsageError if corrections name a missing point or candidate, or move two points to one candidate."""
     points = record.points
     if not corrections.points or points is None:
         return
@@ -88,7 +88,7 @@ def check_corrections(record: TwinRecord, corrections: Corrections) -> None:
 
 
 def pictures_of(root: DatasetRoot, twin_id: str) -> list[str]:
-    """Return the paths of the pictures that the model was shown, and of the card; for a URL their URLs."""
+    """Return the paths (or URLs) of the views that the model was shown, and of the card."""
     name = root.twin_name(twin_id)
     names = [each for each in root.names_below(f"{name}/views") if Path(each).suffix in (".webp", ".png")]
     names += [f"{name}/{_CARD}"] if root.exists(f"{name}/{_CARD}") else []

@@ -1,4 +1,4 @@
-"""Verdicts that were made elsewhere, as CSV or JSONL, and the empty form for them."""
+"""External verdicts in CSV or JSONL files, and the empty form to fill in."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from manitwin.twin.store import write_bytes_atomically
 
 READ = (".csv", ".jsonl")
 SAID = "said"
-"""A column of the form for whoever fills it in: what the twin says. It is not read."""
+"""Form column with the twin's annotations for the person who fills it in; it is not read back."""
 COLUMNS = (*SCHEMA.names, SAID)
 _FORM = (
     "twin_id", "revision", "annotator", "dimension", SAID, "answer", "category", "mass_kg", "mass_low_kg", "mass_high_kg",
@@ -32,7 +32,7 @@ MOST_ROWS = 1_000_000
 
 
 def write_form(path: Path, root: DatasetRoot, twin_ids: Iterable[str], annotator: str) -> int:
-    """Write a CSV file with a row for each dimension of each twin, whose answers are to be filled in; returns the rows."""
+    """Write a CSV form with one row per twin and dimension, answers left blank; return the number of rows."""
     text = io.StringIO()
     writer = csv.DictWriter(text, _FORM, lineterminator="\n")
     writer.writeheader()
@@ -48,10 +48,11 @@ def write_form(path: Path, root: DatasetRoot, twin_ids: Iterable[str], annotator
 
 
 def read_verdicts(path: Path, root: DatasetRoot) -> list[tuple[Review, str]]:
-    """Read reviews that were made elsewhere, each with an id of its content: read again, they are the same ones.
+    """Read external reviews, each with an id derived from its content, so that a file that is read again adds nothing.
 
-    Rows of one annotator on one twin are one review. An empty ``revision`` is that of the twin as it is now; ``prompt`` is the
-    twin's own, where the revision is. Raises UsageError naming the line for what is no verdict, or is of no accepted twin.
+    Rows of one annotator on one twin form one review. An empty ``revision`` means the twin's current one; ``prompt`` is taken
+    from the twin if the revision is current. Raises UsageError naming the line for an invalid verdict or a twin that is not
+    accepted.
     """
     if path.suffix not in READ:
         raise UsageError(f"{path}: {choose_from('suffix', path.suffix, READ)}")
@@ -63,7 +64,7 @@ def read_verdicts(path: Path, root: DatasetRoot) -> list[tuple[Review, str]]:
             if name not in COLUMNS:
                 raise UsageError(f"{path}:{line}: {choose_from('column', name, COLUMNS)}")
         if SAID in row and not str(row.get("answer") or "").strip():
-            continue  # a row of the form that nobody has filled in
+            continue  # an unanswered row of the form
         said = {name: _as_text(value) for name, value in row.items() if value not in (None, "")}
         if missing := [name for name in ("twin_id", "annotator", "dimension", "answer") if not said.get(name)]:
             raise UsageError(

@@ -1,4 +1,4 @@
-"""Verdicts as a table, a row an answer: written as Parquet, CSV and JSONL."""
+"""Table of verdicts, one row per answer, written as Parquet, CSV or JSONL."""
 
 from __future__ import annotations
 
@@ -28,12 +28,14 @@ SCHEMA = pa.schema(
         "prompt": _TEXT, "number": pa.int64(), "at": _REAL,
     }
 )  # fmt: skip
-"""``points`` is 'f0=12;g1=3': point and candidate. ``at`` is seconds since the epoch, ``seconds`` of the whole review."""
+"""``points`` is 'f0=12;g1=3', point and candidate. ``at`` is in seconds since the epoch; ``seconds`` is the time of the whole
+review.
+"""
 FORMATS = (".parquet", ".csv", ".jsonl")
 
 
 def table_of(reviews: Iterable[Stored]) -> pa.Table:
-    """Return verdicts as a table, by twin, annotator and dimension."""
+    """Return verdicts as a table sorted by twin, annotator, review number and dimension."""
     rows = [row for stored in reviews for row in _rows(stored)]
     rows.sort(key=lambda row: (row["twin_id"], row["annotator"], row["number"], DIMENSIONS.index(row["dimension"])))
     return pa.Table.from_pylist(rows, schema=SCHEMA)
@@ -65,7 +67,7 @@ def _rows(stored: Stored) -> Iterator[dict[str, Any]]:
 
 
 def write_verdicts(table: pa.Table, path: Path) -> None:
-    """Write a table by the file's suffix; raises UsageError for another one."""
+    """Write a table in the format of the file's suffix; raises UsageError for an unknown suffix."""
     if path.suffix not in FORMATS:
         raise UsageError(f"{path}: {choose_from('suffix', path.suffix, FORMATS)}")
     if path.suffix == ".parquet":

@@ -1,4 +1,4 @@
-"""What a person says of a twin: answers by dimension, corrections, a note."""
+"""Data model of a review: answers by dimension, corrections, a note."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manitwin.formats.printable import printable_line
 from manitwin.twin.record_values import CONTROLS, LARGEST_KG, LARGEST_M, Finite, FolderName, Record
 
 Dimension = Literal["category", "language", "functional", "physical", "grasp", "mesh", "simulation"]
-"""The paper's five dimensions of annotation quality, the mesh's quality, and the result of the simulation."""
+"""The paper's five dimensions of annotation quality, the mesh quality, and the simulation result."""
 Answer = Literal["yes", "no", "unsure"]
 DIMENSIONS: tuple[Dimension, ...] = get_args(Dimension)
 ANSWERS: tuple[Answer, ...] = get_args(Answer)
@@ -24,7 +24,7 @@ DECIDING_STAGE: dict[Dimension, str] = {
     "mesh": "gate",
     "simulation": "verify",
 }
-"""The stage whose answer a dimension judges: its backend, model and prompt are kept with each verdict."""
+"""The stage whose result a dimension judges; its backend, model and prompt are stored with each verdict."""
 PAPER_ACCURACY: dict[Dimension, float] = {
     "category": 1.0,
     "language": 0.996,
@@ -55,7 +55,7 @@ Name = Annotated[str, Field(min_length=1, max_length=MOST_NAME_CHARACTERS), Afte
 
 
 class Measure(Record):
-    """A quantity as a person states it, with the interval that they are sure of; ``low`` = ``high`` = ``value``: exactly."""
+    """A quantity as stated by a person with a certain interval; ``low`` = ``high`` = ``value`` if exact."""
 
     value: Annotated[Finite, Field(gt=0)]
     low: Annotated[Finite, Field(gt=0)]
@@ -69,7 +69,7 @@ class Measure(Record):
 
 
 class Corrections(Record):
-    """What is true in a person's eyes: ``points`` names the candidate that a point, by its id, belongs to."""
+    """Corrected values; ``points`` maps the id of a point to the candidate where it should be."""
 
     category: Name | None = None
     mass_kg: Measure | None = None
@@ -90,7 +90,7 @@ class Corrections(Record):
         return self
 
     def of(self, dimension: Dimension) -> dict[str, object]:
-        """Return what is corrected in one dimension, by name, as JSON values; empty where nothing is."""
+        """Return the corrections in one dimension, by name, as JSON values; empty if there are none."""
         if dimension == "category":
             return {} if self.category is None else {"category": self.category}
         if dimension == "physical":
@@ -101,10 +101,10 @@ class Corrections(Record):
 
 
 class Review(Record):
-    """One person's verdict on one twin as it was at ``revision``.
+    """One person's verdict on one twin at ``revision``.
 
-    ``seconds`` is the time that it took; ``blind``: without having seen what others, or the annotator's confidence, say.
-    ``prompts`` says of each dimension who gave what was judged: backend, model and prompt version.
+    ``seconds`` is the time it took. ``blind`` reviews are made without seeing other verdicts or the annotation's confidence.
+    ``prompts`` gives, per dimension, the origin of the judged annotations: backend, model and prompt version.
     """
 
     annotator: AnnotatorName
@@ -129,7 +129,7 @@ class Review(Record):
 
 
 def reason_of(error: ValidationError) -> str:
-    """Return in one line why a verdict is none: the first thing that is wrong, and where."""
+    """Return the first validation error of a verdict and its location as one line of text."""
     first = error.errors()[0]
     where = ".".join(str(each) for each in first["loc"])
     said = first["msg"].removeprefix("Value error, ")
