@@ -1,1 +1,1 @@
-"""Where an object is held, used, and which part each of its points is of: maps on its surface, as data sets."""
+"""Affordance data sets: grasp, function and part labels on points of twin surfaces."""

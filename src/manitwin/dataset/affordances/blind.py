@@ -1,4 +1,4 @@
-"""What is right without a look at the shape: the bar that a model of affordances or of parts has to pass."""
+"""Shape-blind baselines that a model of affordances or parts has to exceed."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from manitwin.twin.part_records import NO_PART
 
 @dataclass(frozen=True)
 class BlindMap:
-    """How like a map is to two that know no shape: one value everywhere, and the nearer the middle of the points the larger.
+    """Scores of two shape-blind maps: a constant, and a map that decreases with the distance to the centroid of the points.
 
-    ``uniform_sim`` and ``middle_sim`` are SIM, ``middle_auc`` the area under the ROC curve for its points, NaN where all or none
-    are; of one value everywhere that area is one half.
+    ``uniform_sim`` and ``middle_sim`` are SIM values. ``middle_auc`` is the area under the ROC curve of the second map for the
+    positive points, NaN if all or none are positive; the constant has an AUC of one half.
     """
 
     uniform_sim: float
@@ -28,7 +28,7 @@ class BlindMap:
 
 
 def blind_maps(maps: SurfaceMaps) -> dict[str, BlindMap]:
-    """Return the scores of a twin's maps, by name."""
+    """Return the baseline scores of a twin's maps, by name."""
     distance_m = np.linalg.norm(maps.points_m - maps.points_m.mean(0), axis=1)
     near = 1 - distance_m / max(float(distance_m.max()), 1e-12)
     return {
@@ -42,7 +42,7 @@ def blind_maps(maps: SurfaceMaps) -> dict[str, BlindMap]:
 
 
 def part_shares(maps: SurfaceMaps) -> dict[str, float]:
-    """Return the share of each part, by name, of the points whose part is known."""
+    """Return the share of each part, by name, among the points with a known part."""
     known = maps.parts[maps.parts != NO_PART]
     if not len(known):
         return {}
@@ -54,9 +54,11 @@ def part_shares(maps: SurfaceMaps) -> dict[str, float]:
 
 
 def blind_parts(rows: Sequence[Mapping[str, Any]]) -> tuple[float | None, int]:
-    """Return the mean share of points that are right where all are of the largest part of other twins of the category.
+    """Return the mean accuracy of labelling all points with the largest part of the category's other twins, and the number of
+    twins.
 
-    ``rows`` have ``category`` and ``part_shares``. The second value counts the twins of which that can be said; None: of none.
+    ``rows`` have ``category`` and ``part_shares``. Only twins with another twin of their category count; the accuracy is None if
+    there are none.
     """
     of_category: dict[str, list[Mapping[str, float]]] = defaultdict(list)
     for row in rows:

@@ -1,4 +1,4 @@
-"""All that is known of a twin's surface at some points: parts, and maps of holding and of use."""
+"""Labels of a twin's surface points: parts, grasp maps and function maps."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ from manitwin.twin.part_records import NO_PART
 from manitwin.twin.point_records import FunctionalPoint
 
 POOL = 4
-"""So many samples a point that is kept: the kept ones then lie evenly."""
+"""Oversampling factor; farthest point sampling then keeps an even subset."""
 LEAST_CONTACTS = 8
-"""Fewer make no map."""
+"""Minimum number of contacts of a map."""
 
 
 @dataclass(frozen=True)
 class SurfaceMaps:
-    """A twin's surface at points: ``points_m (N, 3)``, ``normals (N, 3)``, the face and the part of each (255: none).
+    """Surface points of a twin with ``points_m (N, 3)``, ``normals (N, 3)``, and the face and part of each (255: no part).
 
-    ``maps`` are by name, ``(N,)`` in [0, 1]: ``grasp``, ``task_grasp:<scenario's point>``, ``function:<point> <label>``.
-    ``agreement``: of the maps of contacts, by name, how far two halves of their grasps agree, as SIM and AUC; only of those that
-    have enough.
+    ``maps`` has values ``(N,)`` in [0, 1] by name: ``grasp``, ``task_grasp:<functional point> <label>``, ``function:<functional
+    point> <label>``. ``agreement`` has, for contact maps with enough contacts, the split-half agreement of their grasps as SIM
+    and AUC. ``tried`` and ``held`` count the sampled grasps.
     """
 
     twin: Twin
@@ -59,10 +59,10 @@ class SurfaceMaps:
 
 
 def surface_maps(twin: Twin, *, points: int, trials: int, seed: int, grippers: Sequence[Gripper] = ()) -> SurfaceMaps:
-    """Compute the maps of a twin; without enough contacts there is no map ``grasp``. The same arguments give the same maps.
+    """Compute the maps of a twin; the map ``grasp`` is missing if there are too few contacts. Equal arguments give equal maps.
 
-    ``grippers`` are those of one's own that twins were built with. Raises TwinError for a twin that was rejected, UsageError for
-    one without a gripper of parallel jaws that is known.
+    ``grippers`` are user-defined grippers that twins were built with. Raises TwinError for a rejected twin, and UsageError for
+    one without a known parallel-jaw gripper.
     """
     rng = np.random.default_rng([seed, zlib.crc32(twin.record.twin_id.encode())])
     vertices, faces = trimesh.util.append_faces(
@@ -103,7 +103,9 @@ def _agreement(
 
 
 def _task_contacts(twin: Twin, caster: RayCaster, gripper: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return for each functional point that a gripper's verified grasps serve their contacts ``(C, 3)``, and each one's grasp."""
+    """Return the contacts ``(C, 3)`` and their grasp indices for each functional point that verified grasps of a
+    gripper serve.
+    """
     grasps = twin.grasps(gripper=gripper)
     serves = np.array(grasps.columns["functional_point_id"], object)
     found = {}
@@ -118,7 +120,7 @@ def _task_contacts(twin: Twin, caster: RayCaster, gripper: str) -> dict[str, tup
 
 
 def _functions(twin: Twin, points_m: np.ndarray, normals: np.ndarray, extents_m: np.ndarray) -> dict[str, np.ndarray]:
-    """Return a map for each functional point: how near it is along the surface, of an opening how near its rim is."""
+    """Return the proximity map of each functional point; for an opening, the proximity to its rim."""
     found = {}
     for point in twin.record.points.functional if twin.record.points else ():
         seeds = _seeds(point, points_m, normals)
@@ -129,9 +131,10 @@ def _functions(twin: Twin, points_m: np.ndarray, normals: np.ndarray, extents_m:
 
 
 def _seeds(point: FunctionalPoint, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return the points from which the distance to a functional point counts: the nearest on its side of the matter.
+    """Return the points from which the distance to a functional point is measured: the nearest one on the same side of the
+    surface.
 
-    An opening is used all around: its points are those at the rim's circle, as near as neighbours are to each other.
+    An opening is used around its whole rim: its seeds are the points near the rim circle, within twice the point spacing.
     """
     same_side = normals @ np.array(point.normal) > LEAST_COSINE
     away_m = np.linalg.norm(points_m - np.array(point.position_m), axis=1)
@@ -143,10 +146,10 @@ def _seeds(point: FunctionalPoint, points_m: np.ndarray, normals: np.ndarray) ->
 
 
 def _opens(point: FunctionalPoint) -> bool:
-    """Whether a point means an opening whose rim is known."""
+    """Return whether a functional point denotes an opening with a known rim."""
     return point.frame is not None and point.frame.kind == "opening" and means_place(point.label, "opening")
 
 
 def has_parts(maps: SurfaceMaps) -> bool:
-    """Tell whether any point is of a part that is known."""
+    """Return whether any point has a known part."""
     return bool((maps.parts != NO_PART).any())

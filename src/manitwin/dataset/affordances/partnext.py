@@ -1,7 +1,7 @@
-"""Parts in PartNeXt's form: a GLB of each object, and one table of faces by part that its toolkit reads.
+"""Export of parts in the PartNeXt format: a GLB file per object and one table of faces by part.
 
-The form is that of the toolkit ``partnext`` 1.0.1: ``data/<type_id>/<model_id>.glb``, and in ``PartNeXt`` a data set that Hugging
-Face ``datasets`` wrote to disk, with ``model_id``, ``type_id``, ``masks`` (JSON: part, mesh of the file, faces) and
+The format is that of the toolkit ``partnext`` 1.0.1: ``data/<type_id>/<model_id>.glb``, and in ``PartNeXt`` a data set saved to
+disk by Hugging Face ``datasets``, with ``model_id``, ``type_id``, ``masks`` (JSON: part, mesh of the file, faces) and
 ``hierarchyList`` (JSON: ``name``, ``nodeId``, ``maskId``, ``children``; geometry at the leaves).
 """
 
@@ -26,7 +26,7 @@ ANNOTATIONS, MESHES = "PartNeXt", "data"
 
 
 class PartNextFolder:
-    """A folder in PartNeXt's form, written object by object; ``with`` ends its table."""
+    """A folder in PartNeXt format, written object by object; leaving the ``with`` block completes its table."""
 
     def __init__(self, folder: Path):
         self.folder = folder
@@ -36,7 +36,7 @@ class PartNextFolder:
         self._table = pa.ipc.new_stream(str(folder / ANNOTATIONS / _TABLE), _SCHEMA)
 
     def add(self, twin: Twin, category: str) -> None:
-        """Add a twin whose parts are known: its ``visual.glb`` as it is, and the faces of its parts."""
+        """Add a twin with known parts: an unchanged copy of its ``visual.glb``, and the faces of its parts."""
         name = twin.record.twin_id
         mesh = self.folder / MESHES / category / f"{name}.glb"
         mesh.parent.mkdir(parents=True, exist_ok=True)
@@ -65,7 +65,7 @@ class PartNextFolder:
 
 
 def part_masks(twin: Twin) -> dict[str, dict[str, list[int]]]:
-    """Return of each part, by its place in the twin's table, the faces of each mesh of ``visual.glb`` that are of it."""
+    """Return, for each part by its index in the twin's record, its faces in each mesh of ``visual.glb``."""
     faces = [len(mesh.faces) for mesh in twin.visual]
     labels = np.split(twin.face_parts(), np.cumsum(faces)[:-1])
     masks: dict[str, dict[str, list[int]]] = {}
@@ -76,7 +76,7 @@ def part_masks(twin: Twin) -> dict[str, dict[str, list[int]]]:
 
 
 def part_tree(twin: Twin, category: str) -> list[dict[str, object]]:
-    """Return the object with its parts as its leaves."""
+    """Return the hierarchy of an object: one root with the parts as leaves."""
     leaves = [
         {"name": part.name, "nodeId": number, "maskId": number - 1, "children": []}
         for number, part in enumerate(twin.record.parts, 1)

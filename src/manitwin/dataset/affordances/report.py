@@ -1,4 +1,4 @@
-"""The page of affordances: samples of maps and parts on the twins' points, and counts."""
+"""HTML report of an affordance data set: sample pictures of maps and parts, and counts."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from manitwin.twin.part_records import NO_PART
 SIDE_PX, DOT_PX = 200, 3
 MOST_MAPS = 3
 PART_COLORS = ((68, 119, 170), (238, 102, 119), (34, 136, 51), (204, 187, 68), (102, 204, 238), (170, 51, 119))
-"""Those of Paul Tol's bright scheme, in the order of a twin's parts."""
+"""Paul Tol's bright colour scheme, in the order of a twin's parts."""
 NO_COLOR, GROUND = (170, 170, 170), (255, 255, 255)
 
 
 def sample_picture(maps: SurfaceMaps) -> Picture:
-    """Draw a twin's points by part, and by its first three maps from blue (0) to red (1), those behind first."""
+    """Draw a twin's points by part, and by its first three maps from blue (0) to red (1), far points first."""
     parts = np.array([PART_COLORS[part % len(PART_COLORS)] if part != NO_PART else NO_COLOR for part in maps.parts])
     shown = list(maps.maps)[:MOST_MAPS]
     panels = [_dots(maps, parts), *(_dots(maps, _heat(maps.maps[name])) for name in shown)]
@@ -52,7 +52,7 @@ def _dots(maps: SurfaceMaps, colors: np.ndarray) -> np.ndarray:
 
 
 def _blind(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
-    """Return what is right without a look at the shape, as medians by kind of map, and of parts."""
+    """Return the table of shape-blind baselines: medians by kind of map, and the accuracy for parts."""
     of_kind: dict[str, list[list[float | None]]] = {}
     for row in rows:
         for name, scores in row["blind"].items():
@@ -98,7 +98,7 @@ def _median(values: Sequence[float | None]) -> float | None:
 def affordances_page(
     rows: Sequence[Mapping[str, Any]], left_out: Mapping[str, str], samples: Sequence[Picture], with_parts: int
 ) -> bytes:
-    """Return the page of all twins that were written, and of those that were left out with the reason."""
+    """Return the HTML report of all written twins, and of those left out with the reason."""
     kinds = Counter(name.partition(":")[0] for row in rows for name in row["maps"])
     categories = Counter(row["category"] for row in rows)
     splits = Counter(row["split"] for row in rows)

@@ -1,4 +1,4 @@
-"""Grasps sampled anywhere on a twin and tried in its own trial, none chosen among them: what its surface affords."""
+"""Unselected grasps, sampled over a twin's whole surface and simulated in its own trial: the basis of its grasp map."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PROPOSALS_A_ROUND, ROUNDS = 6000, 6
 
 @dataclass(frozen=True)
 class SampledGrasps:
-    """Grasps of a ``gripper`` that were tried, of which ``held (N,) bool`` did."""
+    """Simulated grasps of a ``gripper``; ``held (N,) bool`` says which held."""
 
     gripper: str
     grasps: GraspProposals
@@ -37,11 +37,11 @@ class SampledGrasps:
 def sample_grasps(
     twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.random.Generator, grippers: Sequence[Gripper] = ()
 ) -> SampledGrasps:
-    """Sample antipodal grasps all over a twin's surface and try ``trials`` of them as its own grasps were tried.
+    """Sample antipodal grasps over a twin's surface and simulate ``trials`` of them in the trial of its own grasps.
 
-    They lie no denser at its grasp points, and nothing chooses among them; what a trial could only fail, as the open fingers
-    overlap the object, is left out before. Raises UsageError for a twin none of whose grippers has parallel jaws, whose
-    gripper is neither shipped nor among ``grippers``, or whose record tells no trial that can be run.
+    The grasps are not concentrated at grasp points and not ranked. Grasps that must fail because the open fingers overlap the
+    object are discarded before. Raises UsageError for a twin without a parallel-jaw gripper, with a gripper that is neither
+    shipped nor among ``grippers``, or without a reproducible trial in its record.
     """
     summary, gripper = _parallel(twin, grippers)
     body = twin.rigid_body()
@@ -63,13 +63,13 @@ def sample_grasps(
     proposed = GraspProposals.joined(found)
     chosen = proposed.take(np.sort(rng.permutation(len(proposed))[:trials]))
     settings = settings_of_trial(twin, summary.trial, gripper)
-    trial = ConfirmedTrial(SapienTrial(), MujocoTrial())  # held is what it is in a build
+    trial = ConfirmedTrial(SapienTrial(), MujocoTrial())  # the same definition of held as in a build
     results = trial.run(body, gripper, chosen.gripper_to_object, settings)
     return SampledGrasps(summary.gripper, chosen, np.array([result.outcome == "held" for result in results], bool))
 
 
 def _parallel(twin: Twin, grippers: Sequence[Gripper]) -> tuple[GraspSummary, ParallelGripper]:
-    """Return the first of a twin's grippers that has parallel jaws, of which alone contacts are known, and what it did."""
+    """Return the first parallel-jaw gripper of a twin and its summary; contacts are only defined for parallel jaws."""
     first = twin.record.grasps
     assert first is not None
     others = [other.summary for other in first.other_grippers.values() if other.summary is not None]

@@ -1,4 +1,4 @@
-"""Write maps and parts of a data set's twins as training codes read them."""
+"""Write affordance maps and parts of a data set's twins in the formats that training code reads."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from manitwin.twin.store import canonical_json
 
 POINTS, TRIALS = 2048, 200
 SHOWN = 24
-"""Twins on the page."""
+"""Number of twins shown in the report."""
 SPLITS = (("train", 0.8), ("val", 0.1), ("test", 0.1))
 
 
 @dataclass(frozen=True)
 class Affordances:
-    """What was written: twins with maps, those with parts, those left out with the reason, and how well maps repeat."""
+    """Summary: twins with maps, twins with parts, twins left out with reasons, and the repeatability of the grasp maps."""
 
     twins: int
     with_grasp_map: int
@@ -46,7 +46,7 @@ class Affordances:
 
 
 def split_of(twin_id: str) -> str:
-    """Return the split of a twin by the digest of its id: the same whatever else is in the data set."""
+    """Return the split of a twin by the digest of its id, independent of the rest of the data set."""
     place = int.from_bytes(hashlib.sha256(twin_id.encode()).digest()[:8], "big") / 2**64
     for name, share in SPLITS:
         if place < share:
@@ -65,11 +65,12 @@ def write_affordances(
     grippers: Sequence[Gripper] = (),
     on_twin: Callable[[SurfaceMaps], None] = lambda maps: None,
 ) -> Affordances:
-    """Write the maps of all accepted twins of a local data set below ``out``, whole or not at all.
+    """Write the maps of all accepted twins of a local data set to ``out``, atomically.
 
-    ``maps/<twin>.npz`` has 3D AffordanceNet's fields; ``parts/`` is laid out as ShapeNetPart and ``partnext/`` as PartNeXt, of
-    the twins whose parts are known; ``affordances.json`` lists all, ``report.html`` shows some. ``grippers`` are those of
-    one's own that twins were built with. Raises UsageError for a data set without twins and an ``out`` that is not empty.
+    ``maps/<twin>.npz`` has the fields of 3D AffordanceNet. For twins with known parts, ``parts/`` has the layout of ShapeNetPart
+    and ``partnext/`` that of PartNeXt. ``affordances.json`` lists all twins, ``report.html`` shows some. ``grippers`` are
+    user-defined grippers that twins were built with. Raises UsageError for a data set at a URL or without accepted twins, and for
+    an ``out`` that is not empty.
     """
     root = DatasetRoot(dataset)
     if root.local is None:
@@ -131,7 +132,7 @@ def write_affordances(
 
 
 def maps_file(maps: SurfaceMaps) -> bytes:
-    """Return the content of a twin's .npz: 3D AffordanceNet's fields, and what undoes its unit sphere.
+    """Return the content of a twin's .npz file: the fields of 3D AffordanceNet, and the inverse of its normalization.
 
     ``coordinate (N, 3)`` is centred on the points' mean and scaled to the unit sphere: m = coordinate * scale_m + center_m.
     """
@@ -157,12 +158,12 @@ def maps_file(maps: SurfaceMaps) -> bytes:
 
 
 def category_folder(category: str) -> str:
-    """Return a category as the name of a folder: letters, digits and underscores, whatever words a twin says."""
+    """Return a category as a folder name of letters, digits and underscores."""
     return re.sub(r"[^\w]+", "_", category)[:60].strip("_") or "object"
 
 
 def parts_file(maps: SurfaceMaps, part_ids: dict[str, int]) -> bytes:
-    """Return ShapeNetPart's rows ``x y z nx ny nz part`` of the points whose part is known, metres, object frame."""
+    """Return ShapeNetPart rows ``x y z nx ny nz part`` of the points with a known part, in metres, object frame."""
     kinds = [part_ids[f"{_category(maps.twin)}/{part.name}"] for part in maps.twin.record.parts]
     known = np.flatnonzero(maps.parts != NO_PART)
     rows = [

@@ -1,1 +1,1 @@
-"""Twins against truth that somebody else wrote down: labels of annotations, scored with intervals."""
+"""Evaluation of data sets against ground-truth labels and the paper's figures, with confidence intervals."""

@@ -1,4 +1,4 @@
-"""How a twin's annotations are scored against labels: the rules, each a question that is answered yes, no or not at all."""
+"""Scoring rules of annotations against labels; each question is answered right or wrong, or not asked."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MASS_FACTOR = 1.6
 
 @dataclass(frozen=True)
 class Score:
-    """One question about one twin: of which dimension, what was asked, the answer, and what was said against what is true."""
+    """One question about one twin: dimension, question, verdict, the annotation and the label."""
 
     twin_id: str
     dimension: str
@@ -31,7 +31,7 @@ class Score:
 
 
 def scores_of(record: TwinRecord, label: Label) -> Iterator[Score]:
-    """Yield every question that the label can answer; a dimension without a label has none."""
+    """Yield a score for every question that the label can answer; dimensions without a label have none."""
     language, physical, points = record.language, record.physical, record.points
     if language is None or physical is None or points is None:
         return
@@ -65,7 +65,7 @@ def scores_of(record: TwinRecord, label: Label) -> Iterator[Score]:
 
 
 def _of_mass(twin_id: str, said: Estimate, true: Interval) -> Iterator[Score]:
-    """Yield the questions about a mass; one without an interval, which was given or follows from parts, lies in the true one."""
+    """Yield the scores of a mass. An exact mass (given, or derived from parts) must lie in the labelled interval."""
     text = f"{said.value:.3g} kg ({said.low:.3g} to {said.high:.3g})"
     factor = max(said.value / true.middle, true.middle / said.value)
     is_exact = said.low == said.high
@@ -81,7 +81,7 @@ def _score(
 
 
 def _names_one(said: str, truth: Iterable[str]) -> bool:
-    """Tell whether a text names at least one of the labelled words: one dominant colour, one material is enough."""
+    """Return whether a text contains at least one of the labelled words; one dominant colour or one material suffices."""
     words = words_of(re.sub(r"\([^)]*\)", " ", said))
     return any(words_of(each) <= words for each in truth)
 

@@ -30,7 +30,7 @@ SHOWN = 5
 
 @dataclass(frozen=True)
 class PointDistance:
-    """How far (m) a functional point is from the part that its label names; None: the twin has no such part."""
+    """Distance (m) of a functional point from the part that its label names; None if the twin has no such part."""
 
     twin_id: str
     point: str
@@ -40,7 +40,7 @@ class PointDistance:
 
 @dataclass(frozen=True)
 class AnnotationReport:
-    """Scores of all questions, distances of functional points, and the labels that no twin was found for."""
+    """Scores of all questions, distances of functional points, and the labels without a twin."""
 
     twins: int
     scores: tuple[Score, ...]
@@ -48,7 +48,7 @@ class AnnotationReport:
     without_twin: tuple[str, ...]
 
     def shares(self) -> dict[str, tuple[int, int]]:
-        """Return (right, asked) by dimension, and by question within it for all but single points."""
+        """Return (right, asked) per dimension, and per question within it except for single points."""
         counts: dict[str, tuple[int, int]] = {}
         for score in self.scores:
             kind = score.question if score.dimension in ("language", "physical") else score.question.partition(" ")[2]
@@ -58,7 +58,7 @@ class AnnotationReport:
         return {name: counts[name] for name in sorted(counts, key=_place)}
 
     def lines(self) -> list[str]:
-        """Return the table as text, then the distances, then what is wrong."""
+        """Return the table as text, then the distances, then the wrong answers."""
         lines = [f"{self.twins} twins with labels"]
         for name, (right, asked) in self.shares().items():
             low, high = wilson_interval(right, asked)
@@ -82,10 +82,10 @@ class AnnotationReport:
 
 
 def evaluate_annotations(dataset: str, labels: Path) -> AnnotationReport:
-    """Score every accepted twin that a label is of.
+    """Score every accepted twin that has a label.
 
-    A label's twin is that of its ``twin_id``, or the one whose input's path ends in its ``file`` (by the data set's ledger).
-    Raises UsageError for labels that cannot be read, a data set without twins, or where no label has a twin.
+    A label refers to a twin by ``twin_id``, or by the end of the input's path in ``file`` (looked up in the data set's ledger).
+    Raises UsageError for labels that cannot be read, a data set without twins, or if no label has a twin.
     """
     known, source = read_labels(labels), TwinSource(dataset)
     paths = _inputs(dataset)
@@ -114,7 +114,7 @@ def _place(name: str) -> tuple[int, str]:
 
 
 def _inputs(dataset: str) -> Mapping[str, str]:
-    """Return the twin of each input by its path, from the ledger; empty where the data set has none."""
+    """Return the twin id of each input by its path, from the ledger; empty if the data set has none."""
     ledger = local_ledger(DatasetRoot(dataset))
     if not ledger.is_file():
         return {}
@@ -129,7 +129,7 @@ def _path_of(item: str, ledger: Path) -> str:
 
 
 def _twin_of(file: str, paths: Mapping[str, str]) -> str | None:
-    """Return the twin whose input ends in a path; raises UsageError where that is true of several."""
+    """Return the twin whose input path ends in ``file``; raises UsageError if there are several."""
     wanted = PurePosixPath(file).parts
     found = {
         twin_id for path, twin_id in paths.items() if wanted and PurePosixPath(path).parts[-len(wanted) :] == wanted

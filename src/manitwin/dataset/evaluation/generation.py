@@ -1,4 +1,4 @@
-"""``manitwin evaluate generation``: how many inputs become twins, why not, and how like their inputs the twins are."""
+"""``manitwin evaluate generation``: success rate of inputs, causes of rejection, and similarity of twins to their inputs."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ _SIZES = Query(
 def evaluate_generation(
     dataset: str, models: Models, *, seed: int = 0, on_twin: Callable[[str], None] = lambda twin_id: None
 ) -> EvaluationReport:
-    """Return the tables of a data set's generation, by its index and by views of its accepted twins.
+    """Return the tables on a data set's generation, from its index and from views of its accepted twins.
 
-    ``models`` judge likeness besides the built-in measures; what no model was named for is None, and stands for not measured.
-    ``on_twin`` hears of each twin that was compared. Raises UsageError for a data set without an index, at a URL, or empty.
+    ``models`` compute similarity in addition to the built-in measures; metrics of a missing model are None and shown as not
+    measured. ``on_twin`` is called for each compared twin. Raises UsageError for a data set without an index, at a URL, or empty.
     """
     root = DatasetRoot(dataset)
     if root.local is None:

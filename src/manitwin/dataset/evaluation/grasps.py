@@ -1,4 +1,4 @@
-"""``manitwin evaluate grasps``: how many hold, how different they are, and what repeats and a second engine say."""
+"""``manitwin evaluate grasps``: success rates and diversity of grasps, repeated trials, and results in a second engine."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from manitwin.twin.dataset_root import DatasetRoot
 
 _OCTANT = """(2 * (q[2] * q[4] + q[1] * q[3]) >= 0)::INT + 2 * (2 * (q[3] * q[4] - q[1] * q[2]) >= 0)::INT
     + 4 * (1 - 2 * (q[2] * q[2] + q[3] * q[3]) >= 0)::INT"""
-"""The octant of the approach direction, the third column of the rotation of a quaternion wxyz (geometry.grasp_diversity)."""
+"""Octant of the approach direction, the third column of the rotation of a wxyz quaternion (geometry.grasp_diversity)."""
 
 
 def _by(name: str, key: str, caption: str) -> Query:
-    """Return the query of grasps by a column: the filtered ones, the unfiltered sample, octants, repeats, second engine."""
+    """Return the query of grasps by a column: filtered grasps, unfiltered sample, octants, repeated trials, second engine."""
     return Query(
         name,
         caption,
@@ -60,7 +60,7 @@ _TWINS = Query(
 
 
 def evaluate_grasps(dataset: str) -> EvaluationReport:
-    """Return the tables of a data set's grasps, from its index alone.
+    """Return the tables on a data set's grasps, from its index alone.
 
     Raises UsageError for a data set without an index, or without accepted twins.
     """

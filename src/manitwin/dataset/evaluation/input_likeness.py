@@ -1,4 +1,4 @@
-"""How like its input each twin is, and how like another twin's input: the control without which a figure says nothing."""
+"""Similarity of each twin to its input, and to another twin's input as the control."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ ULIP, CLIP_NORMALS, CLIP_COLORS = "ULIP", "CLIP(N-I/T)", "CLIP(I-I/T)"
 LOOK_MEAN, LOOK_BEST, OUTLINE = "EfficientNet-Lite0 cosine", "EfficientNet-Lite0 cosine, best view", "silhouette IoU"
 METRICS = (ULIP, CLIP_NORMALS, CLIP_COLORS, LOOK_MEAN, LOOK_BEST, OUTLINE)
 OF_PICTURES = (LOOK_MEAN, LOOK_BEST, OUTLINE)
-"""What a text has no value of."""
+"""Metrics that exist for images only."""
 
 
 @dataclass(frozen=True)
 class Models:
-    """The models that a person named; without one its metrics are not measured."""
+    """The user's similarity models; without a model its metrics are not measured."""
 
     clip: ClipFolder | ClipEndpoint | None = None
     ulip: ClipFolder | None = None
 
     def said(self) -> dict[str, dict[str, Any] | None]:
-        """Return the name and the files' sha256 of each, none of a server's; None where none was named."""
+        """Return the name and file sha256 of each model (no sha256 for a server); None if it was not given."""
         given: dict[str, ClipFolder | ClipEndpoint | None] = {"clip": self.clip, "ulip": self.ulip}
         return {
             name: None if each is None else {"name": each.name, "sha256": each.sha256} for name, each in given.items()
@@ -40,9 +40,9 @@ class Models:
 
 @dataclass(frozen=True)
 class Likeness:
-    """A twin's values by metric for its own input, and for that of the twin ``shuffled_with``.
+    """Similarity of a twin, by metric, to its own input and to that of the twin ``shuffled_with``.
 
-    ``picture``: input, the view of the most like outline, and its normals, side by side.
+    ``picture`` shows side by side the input, the view with the most similar silhouette, and its normals.
     """
 
     twin_id: str
@@ -58,11 +58,10 @@ class Likeness:
 def likeness_of_twins(
     twins: Iterable[Twin], models: Models, *, seed: int = 0, on_twin: Callable[[str], None] = lambda twin_id: None
 ) -> list[Likeness]:
-    """Return the likeness of each twin that was made of an image or a text to it.
+    """Return the similarity of each twin made from an image or a text to its input.
 
-    The other input is that of a twin drawn by chance of the same kind whose input has other bytes; None where there is none.
-    ``on_twin`` hears of each that was compared. Raises Unavailable without EfficientNet's weights, RendererMissing where nothing
-    renders.
+    The control input is that of a random twin of the same kind whose input has other bytes; None if there is none. ``on_twin`` is
+    called for each compared twin. Raises Unavailable without the EfficientNet weights, and RendererMissing without a renderer.
     """
     made = [(twin, source) for twin in twins if (source := source_of(twin)) is not None]
     inputs = [_Input.of(source, models) for _, source in made]
@@ -71,13 +70,15 @@ def likeness_of_twins(
     for place, (twin, source) in enumerate(made):
         other = None if (o := others[place]) is None else (made[o][0].record.twin_id, inputs[o])
         found.append(_likeness(twin, source, inputs[place], other, models))
-        if found[-1].own:  # a text with no model to read it is compared with nothing
+        if found[-1].own:  # a text without a model is not compared
             on_twin(twin.record.twin_id)
     return found
 
 
 def partners(sources: Sequence[Source], rng: np.random.Generator) -> list[int | None]:
-    """Return the place of another input of the same kind for each, each taken about as often; None where all are the same."""
+    """Return, for each source, the index of another source of the same kind, chosen about equally often; None if all
+    are equal.
+    """
     chosen: list[int | None] = [None] * len(sources)
     for kind in ("image", "text"):
         order = rng.permutation(
@@ -95,7 +96,7 @@ def _differ(one: Source, other: Source) -> bool:
 
 @dataclass(frozen=True)
 class _Input:
-    """An input as vectors: of EfficientNet, and of the models that were named."""
+    """Feature vectors of an input: of EfficientNet, and of the user's models."""
 
     source: Source
     look: np.ndarray | None
@@ -141,7 +142,7 @@ def _likeness(twin: Twin, source: Source, own: _Input, other: tuple[str, _Input]
 def _values(
     given: _Input, views: Sequence[View], looks: np.ndarray | None, vectors: dict[str, np.ndarray]
 ) -> tuple[dict[str, float], int]:
-    """Return the values by metric of views against an input, and the place of the view whose outline is the most like."""
+    """Return the similarity of views to an input by metric, and the index of the view with the most similar silhouette."""
     values = {}
     for name, of_twin in vectors.items():
         of_input = given.ulip if name == ULIP else given.clip

@@ -1,4 +1,4 @@
-"""Truth labels of objects: a CSV file with one row an object, empty where nothing is to be scored."""
+"""Ground-truth labels of objects: a CSV file with one row per object; empty cells are not scored."""
 
 from __future__ import annotations
 
@@ -26,20 +26,22 @@ GRASP_TYPES: tuple[str, ...] = get_args(GraspType)
 
 @dataclass(frozen=True)
 class Interval:
-    """Plausible values; ``middle`` is the geometric mean of the ends."""
+    """A plausible interval; ``middle`` is the geometric mean of its ends."""
 
     low: float
     high: float
 
     @property
     def middle(self) -> float:
-        """The value that is compared: the geometric mean."""
+        """The geometric mean, used for comparison."""
         return math.sqrt(self.low * self.high)
 
 
 @dataclass(frozen=True)
 class Label:
-    """The truth of one object; empty lists and None are not scored. ``file`` is the input, ``twin_id`` where that is known."""
+    """The ground truth of one object; empty lists and None are not scored. ``file`` is the input, ``twin_id`` the
+    twin if known.
+    """
 
     file: str
     twin_id: str | None
@@ -55,12 +57,12 @@ class Label:
 
     @property
     def named_parts(self) -> tuple[str, ...]:
-        """All parts that the label names: those with a use, and those by which it is held or is not."""
+        """All parts named by the label: functional parts, and good and bad grasp regions."""
         return tuple(dict.fromkeys((*self.parts, *self.good_regions, *self.bad_regions)))
 
 
 def read_labels(path: Path) -> list[Label]:
-    """Read a file of labels; raises UsageError naming the line where a column or a grasp type is unknown or a number is none."""
+    """Read a label file; raises UsageError, naming the line, for an unknown column or grasp type or an invalid number."""
     labels: list[Label] = []
     for line, row in read_csv(path, UsageError):
         for name in row:
@@ -95,7 +97,7 @@ def _label(said: Mapping[str, str], where: str) -> Label:
 
 
 def _grasp_type(said: str, where: str) -> str:
-    """Return a grasp type by its name in records; people, and this program in words, write "parallel jaw"."""
+    """Return a grasp type by its identifier; spellings such as "parallel jaw" are accepted."""
     name = "_".join(said.lower().replace("-", " ").split())
     if name not in GRASP_TYPES:
         raise UsageError(f"{where}: {choose_from('typical_grasp_type', said, GRASP_TYPES)}")

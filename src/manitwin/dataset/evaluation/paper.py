@@ -1,4 +1,4 @@
-"""The paper's published figures, and what of them can be set against figures measured here."""
+"""Figures published in the paper, and their comparability with figures measured here."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GENERATION_QUALITY: dict[str, dict[str, float]] = {
 GENERATION_TIME_S = 45.0
 
 GENERATION_SUCCESS, CANDIDATES, VERIFIED, VERIFICATION = 0.6967, 81.63, 62.14, 0.7613
-"""Table 4: success rate of generation, grasp candidates and verified grasps an object, success rate of verification."""
+"""Table 4: success rate of generation, grasp candidates and verified grasps per object, success rate of verification."""
 GRASPS, OBJECTS, CATEGORIES, SMALLEST_M, LARGEST_M = 5_000_000, 100_000, 512, 0.02, 0.37
 
 
@@ -31,7 +31,7 @@ def beside(
     interval: tuple[float | None, float | None] = (None, None),
     objects: int | None = None,
 ) -> dict[str, Any]:
-    """Return a row of a figure here, with its 95 % interval, beside the paper's; ``comparable`` is yes, in part or no."""
+    """Return a table row with a local figure, its 95 % interval and the paper's figure; ``comparable`` is yes, in part or no."""
     return {
         "metric": metric,
         "here": here,
@@ -45,9 +45,9 @@ def beside(
 
 
 def grasp_rows(twins: dict[str, Any], rate: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the paper's figures of grasps (table 4, table 3) beside those of a data set.
+    """Return the paper's grasp figures (tables 4 and 3) beside those of a data set.
 
-    ``twins``: ``objects``, ``simulated``, ``verified`` (means) and ``total``; ``rate``: the rows of ``verification_rate``.
+    ``twins`` has ``objects``, ``simulated``, ``verified`` (means) and ``total``; ``rate`` has the rows of ``verification_rate``.
     """
     first = next((row for row in rate if row["proposals"].startswith("filtered")), None)
     share = None if first is None else first["rate"]

@@ -1,4 +1,4 @@
-"""Names of parts in words of everyday language: which two mean the same part, and which name a place on a listed one."""
+"""Matching of part names in everyday words: which names are synonyms, and which denote a location on another part."""
 
 from __future__ import annotations
 
@@ -23,35 +23,35 @@ _ON = {
     "tine": frozenset({"head", "prong"}),
     "upper": frozenset({"toe", "vamp"}),
 }
-"""What is on a part of a name, or is it in another word: what has a body has its sides there; tines, a bowl and bristles are the
-head of a fork, a spoon and a brush. A top is not on the body (it may be a cap's), and what carries a blade is more than it.
+"""Nouns for locations on a part, or synonyms of it. A body includes its sides; tines, bowl and bristles are the heads of a fork,
+a spoon and a brush. A top is not on the body, since it may be a cap's, and the carrier of a blade is more than the blade.
 """
 
 
 def words_of(text: str) -> frozenset[str]:
-    """Return the words of a text, in one spelling, plurals as their singular."""
+    """Return the set of words of a text, in normalized spelling and singular."""
     return frozenset(_plain(word) for word in re.findall(r"[a-z]+", text.lower()))
 
 
 def matches(name: str, other: str) -> bool:
-    """Tell whether two names of a part mean the same: equal, or all words of one among those of the other, plurals alike."""
+    """Return whether two part names are equivalent: all words of one are among those of the other, ignoring plurals."""
     one, two = words_of(name), words_of(other)
     return bool(one and two) and (one <= two or two <= one)
 
 
 def is_one_of(name: str, truth: Iterable[str]) -> bool:
-    """Tell whether a name of a part is one of those listed, as ``matches`` tells."""
+    """Return whether a part name matches one of the listed names."""
     return any(matches(name, each) for each in truth)
 
 
 def is_on_one_of(name: str, truth: Iterable[str]) -> bool:
-    """Tell whether a name is that of a listed part, in the same words or others, or of a place on one."""
+    """Return whether a name denotes a listed part, by itself or a synonym, or a location on one."""
     listed = tuple(truth)
     return is_one_of(name, listed) or any(_noun(name) in _ON.get(_noun(each), ()) for each in listed)
 
 
 def _noun(name: str) -> str:
-    """Return what a name calls a thing: the last word before ``of`` and the like, a singular."""
+    """Return the head noun of a name, singular: the last word before ``of`` and similar prepositions."""
     found = re.findall(r"[a-z]+", re.split(r"\b(?:of|in|for|on)\b", name.lower())[0])
     return _plain(found[-1]) if found else ""
 

@@ -1,4 +1,4 @@
-"""Likeness to the input as rows of tables, with the control and the paper's figures, and as sample pictures."""
+"""Similarity to the input as table rows, with control and paper figures, and as sample pictures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _BUILT_IN = (
 
 
 def quality_rows(found: Sequence[Likeness], seconds: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return a row for each metric and kind of input, and the time of generation (``seconds``: by ``input``)."""
+    """Return a row per metric and kind of input, and the generation time (``seconds``: rows by ``input``)."""
     rows = []
     for kind in ("image", "text"):
         some = [each for each in found if each.source.kind == kind]
@@ -56,7 +56,7 @@ def _columns(metric: str, kind: str, here: float | None, objects: int) -> dict[s
 
 
 def twin_rows(found: Sequence[Likeness]) -> list[dict[str, Any]]:
-    """Return a row for each twin with its values and those against another's input."""
+    """Return a row per twin with its similarity to its own and to the control input."""
     return [
         {
             "twin_id": each.twin_id,
@@ -73,7 +73,7 @@ def twin_rows(found: Sequence[Likeness]) -> list[dict[str, Any]]:
 
 
 def sample_pictures(found: Sequence[Likeness]) -> list[Picture]:
-    """Return the pictures of twins of images, those whose outline is the least like first."""
+    """Return the pictures of twins made from images, least similar silhouette first."""
     shown = sorted(
         (each for each in found if each.picture is not None), key=lambda each: (each.own[OUTLINE], each.twin_id)
     )

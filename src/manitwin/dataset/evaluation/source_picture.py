@@ -1,4 +1,4 @@
-"""What a twin was made of, and how like it the twin is: the photo cut out, or the text; outlines and features compared."""
+"""The input of a twin, a segmented photo or a text, with its comparison by silhouette and image features."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from manitwin.pipeline.stated_place import as_box
 from manitwin.twin.loaded_twin import Twin
 
 OUTLINE_PX, OUTLINE_RADIUS = 96, 20.0
-"""Outlines are compared as if each had the area of a disc of this radius, in squares of this side."""
+"""Silhouettes are compared in squares of this side, scaled to the area of a disc of this radius (pixels)."""
 TURNS = 24
-"""In the picture's plane: nobody says which way up a thing lies that is seen from above."""
+"""Rotations in the image plane: the orientation of objects seen from above is unknown."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """What a twin was made of: an ``image`` with the cut-out's ``rgb`` and ``mask``, or a ``text``.
+    """The input of a twin: an ``image`` with the ``rgb`` and ``mask`` of its foreground, or a ``text``.
 
-    ``left_out`` says why an image is compared with nothing.
+    ``left_out`` says why an image is not compared.
     """
 
     kind: str
@@ -40,7 +40,7 @@ class Source:
 
     @property
     def on_white(self) -> np.ndarray:
-        """Return the thing on white in a square ``(224, 224, 3) uint8``, centred, as large as in the views."""
+        """The object centred on a white square ``(224, 224, 3) uint8``, as large as in the views."""
         assert self.rgb is not None and self.mask is not None
         rows, columns = np.flatnonzero((self.mask > 0.5).any(1)), np.flatnonzero((self.mask > 0.5).any(0))
         middle = (columns[0] + columns[-1] + 1) / 2, (rows[0] + rows[-1] + 1) / 2
@@ -49,16 +49,16 @@ class Source:
         move = np.array([[scale, 0, SIDE_PX / 2 - scale * middle[0]], [0, scale, SIDE_PX / 2 - scale * middle[1]]])
         share = self.mask.astype(np.float32)[..., None]
         bare = (self.rgb * share + WHITE * (1 - share)).astype(np.float32)
-        if scale < 0.5:  # a warp takes single pixels
+        if scale < 0.5:  # warping without prior blur would alias
             bare = np.asarray(cv2.blur(bare, (max(1, round(1 / scale)),) * 2), np.float32)
         shown = cv2.warpAffine(bare, move, (SIDE_PX, SIDE_PX), borderValue=(WHITE,) * 3)
         return np.rint(np.clip(shown, 0, 255)).astype(np.uint8)
 
 
 def source_of(twin: Twin) -> Source | None:
-    """Return what a twin was generated of; None for a mesh, of which nothing is generated.
+    """Return the input that a twin was generated from; None for a mesh, from which nothing is generated.
 
-    A photo is cut out anew, as a build does by default.
+    A photo is segmented again with the default settings of a build.
     """
     source = twin.record.source
     if source.kind == "text":
@@ -83,13 +83,13 @@ def source_of(twin: Twin) -> Source | None:
 
 
 def look(rgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Return the unit vector ``(1280,)`` of EfficientNet-Lite0's features of a thing on grey; raises Unavailable."""
+    """Return the unit vector ``(1280,)`` of EfficientNet-Lite0 features of an object on grey; raises Unavailable."""
     vector = features(centered(rgb, mask)[0][None])[0, -NETWORK:].astype(np.float64)
     return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-9))
 
 
 def outline(mask: np.ndarray, turn_rad: float = 0.0) -> np.ndarray:
-    """Return a mask ``(H, W)``, 0..1, as ``(96, 96) bool``: its centroid in the middle, its area that of one disc, turned."""
+    """Return the silhouette ``(96, 96) bool`` of a mask ``(H, W)`` in 0..1, centred, scaled to a fixed area, and rotated."""
     inside = (mask > 0.5).astype(np.float32)
     area = float(inside.sum())
     rows, columns = np.nonzero(inside)
@@ -103,7 +103,7 @@ def outline(mask: np.ndarray, turn_rad: float = 0.0) -> np.ndarray:
 
 
 def best_outline(mask: np.ndarray, views: Sequence[View]) -> tuple[float, int]:
-    """Return the largest intersection over union of a mask's outline with those of views, over turns, and the view's place."""
+    """Return the largest silhouette IoU of a mask with the views over all rotations, and the index of the best view."""
     turned = np.array([outline(mask, 2 * np.pi * turn / TURNS).ravel() for turn in range(TURNS)], np.float32)
     seen = np.array([outline(view.coverage).ravel() for view in views], np.float32)
     both = turned @ seen.T

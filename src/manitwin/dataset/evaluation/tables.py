@@ -1,4 +1,4 @@
-"""Tables of an evaluation: printed, as one document, and as a folder of CSV, Parquet and a page."""
+"""Tables of an evaluation, printed to the terminal, as one JSON document, and as a folder of CSV, Parquet and HTML."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from manitwin.formats.printable import printable_line
 from manitwin.twin.store import canonical_json
 
 MEASURED, NOT_MEASURED, MISSING = "here", "not measured", "–"
-"""The column of figures that are measured, what it says where none was, and what other columns say."""
+"""Column of measured figures, its text for missing values, and the text in other columns."""
 WHY = "why"
-"""The column of reasons, which the terminal shows below the table."""
+"""Column of reasons, which the terminal shows below the table."""
 DOCUMENT, REPORT = "evaluation.json", "report.html"
 _MOST_PRINTED = 25
 _WIDEST = 60
@@ -31,9 +31,9 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class EvaluationTable:
-    """Rows with the same columns; None is what was not measured, or where there is nothing to divide by.
+    """Rows with equal columns; None marks values that were not measured or are undefined.
 
-    ``printed``: the terminal shows it; a row a twin is for files.
+    ``printed`` tables are shown in the terminal; tables with one row per twin are for files only.
     """
 
     name: str
@@ -44,13 +44,13 @@ class EvaluationTable:
 
     @classmethod
     def of(cls, result: Result) -> EvaluationTable:
-        """Return the table of a query's rows, all of their columns."""
+        """Return the table of a query's rows with all columns."""
         return cls(result.query.name, result.query.caption, result.rows, result.query.note)
 
 
 @dataclass(frozen=True)
 class EvaluationReport:
-    """What was evaluated: the first sentences, the tables in order, the models that judged, and samples."""
+    """An evaluation: lead sentences, tables in order, the models used, and sample pictures."""
 
     title: str
     lead: Sequence[str]
@@ -59,7 +59,7 @@ class EvaluationReport:
     pictures: Sequence[Picture] = ()
 
     def table(self, name: str) -> Sequence[Row]:
-        """Return a table's rows."""
+        """Return the rows of a table."""
         return next(table.rows for table in self.tables if table.name == name)
 
     def document(self) -> dict[str, Any]:
@@ -87,7 +87,7 @@ class EvaluationReport:
 def write_evaluation(out: Path, report: EvaluationReport) -> None:
     """Write ``evaluation.json``, ``report.html`` and each table as ``.csv`` and ``.parquet`` into a new folder.
 
-    Whole or not at all; equal input gives equal bytes. Raises UsageError for a folder that is not empty.
+    The folder is written atomically; equal input gives equal bytes. Raises UsageError for a folder that is not empty.
     """
     parts: list[Picture | Table] = [
         Table(

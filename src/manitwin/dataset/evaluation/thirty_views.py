@@ -1,4 +1,4 @@
-"""The 30 views by which generation is judged (paper, "Evaluation Metrics"): colours, normals and outlines."""
+"""The 30 views for evaluating generation (paper, "Evaluation Metrics"): colours, normals and silhouettes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from manitwin.render.renderer import shared_renderer
 from manitwin.twin.loaded_twin import Twin
 
 RINGS = ((10.0, 12), (35.0, 10), (65.0, 6), (89.0, 1), (-89.0, 1))
-"""Elevation (degrees) and views around: the paper says how many views there are, not which."""
+"""Elevation (degrees) and number of views around; the paper states the number of views, not their poses."""
 VIEWS = sum(count for _, count in RINGS)
 SIDE_PX, FOV_Y_DEG = 224, 30.0
 WHITE = 255
@@ -22,9 +22,9 @@ WHITE = 255
 
 @dataclass(frozen=True)
 class View:
-    """A view: ``rgb`` and ``normals (S, S, 3) uint8`` on white, ``grey``, the colours on grey, ``coverage (S, S)`` 0..1.
+    """A view: ``rgb`` and ``normals (S, S, 3) uint8`` on white, ``grey`` the colours on grey, ``coverage (S, S)`` in 0..1.
 
-    A normal (x right, y up, z to the viewer) is shown as ``(n + 1) / 2``.
+    A normal (x right, y up, z to the viewer) is encoded as ``(n + 1) / 2``.
     """
 
     rgb: np.ndarray
@@ -34,7 +34,7 @@ class View:
 
 
 def cameras(points_m: np.ndarray) -> list[Camera]:
-    """Return the cameras of the 30 views, each of which shows all of ``points_m (N, 3)`` as large as may be."""
+    """Return the cameras of the 30 views, each framing all ``points_m (N, 3)``."""
     return [
         framing_camera(
             points_m,
@@ -50,7 +50,7 @@ def cameras(points_m: np.ndarray) -> list[Camera]:
 
 
 def thirty_views(twin: Twin) -> list[View]:
-    """Draw a twin's surface from 30 sides; raises RendererMissing where nothing renders."""
+    """Render a twin's surface from 30 sides; raises RendererMissing without a renderer."""
     around = cameras(np.concatenate([part.vertices for part in twin.visual]))
     caster = RayCaster(merged(twin.visual))
     grey, white = (GREY,) * 3, (WHITE,) * 3
@@ -62,7 +62,7 @@ def thirty_views(twin: Twin) -> list[View]:
 
 
 def normal_picture(caster: RayCaster, camera: Camera) -> np.ndarray:
-    """Return the normals of what a camera sees, in its frame, as colours ``(H, W, 3) uint8`` on white."""
+    """Return the visible normals in the camera frame, encoded as colours ``(H, W, 3) uint8`` on white."""
     _, normals, face = cast_camera(caster, camera)
     seen = normals @ camera.camera_to_object[:3, :3]
     colors = np.rint((seen + 1) / 2 * 255)

@@ -1,1 +1,1 @@
-"""The statistics of a data set: tables by SQL over its index, their figures, and one HTML report of both."""
+"""Statistics of a data set: SQL tables over its index, figures, and an HTML report."""

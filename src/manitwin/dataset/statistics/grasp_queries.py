@@ -1,4 +1,4 @@
-"""Grasps: how many of an object are proposed, tried and verified, how the others fail, and what a second look says."""
+"""Grasp queries: grasps proposed, simulated and verified per object, failure modes, robustness and second-engine results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Objects: points and placements, size and mass, categories, and the words of the six attributes."""
+"""Object queries: points and placements, size and mass, categories, and the words of the six attributes."""
 
 from __future__ import annotations
 
@@ -139,18 +139,18 @@ FROM twins WHERE longest_m > 0 AND mass_kg > 0 ORDER BY md5(twin_id || ':{SAMPLE
 
 
 def priors_of(categories: Iterable[str]) -> dict[str, Prior]:
-    """Return the priors of the categories that have one."""
+    """Return the priors of those categories that have one."""
     found = {category: lookup(category) for category in categories}
     return {category: prior for category, prior in found.items() if prior is not None}
 
 
 def _double(value: float) -> str:
-    """Return a number as a literal that DuckDB takes for a double; without the exponent it would be a decimal."""
+    """Return a number as a DuckDB double literal; without the exponent it would be a decimal."""
     return f"{value!r}e0"
 
 
 def mass_in_prior(priors: dict[str, Prior]) -> Query:
-    """Return the query that holds twins' masses and sizes against the package's priors, which it spells out."""
+    """Return the query that compares twins' masses and sizes with the package's priors, which are embedded as literals."""
     rows = ",\n  ".join(
         f"({sql_text(category)}, {_double(prior.mass_kg.low)}, {_double(prior.mass_kg.typical)}, "
         f"{_double(prior.mass_kg.high)}, {_double(prior.longest_axis_m.low)}, {_double(prior.longest_axis_m.high)})"

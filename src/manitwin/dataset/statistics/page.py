@@ -1,4 +1,4 @@
-"""The report as one HTML page, which needs no request and no script, with its figures and its numbers beside it."""
+"""The report as a self-contained HTML page without scripts, with its figures and numbers as separate files."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ MISSING = "–"
 
 @dataclass(frozen=True)
 class NearPairs:
-    """Pairs of twins of nearly one shape and size, the nearest first: some of ``pairs``, which are of ``twins`` twins.
+    """The nearest near-duplicate pairs, out of ``pairs`` pairs among ``twins`` twins.
 
-    ``found_by`` is the call that finds them all.
+    ``found_by`` is the call that finds all of them.
     """
 
     nearest: list[Row]
@@ -32,7 +32,7 @@ class NearPairs:
 
 
 SectionPart = Result | Figure | tuple[Figure, ...] | NearPairs
-"""What a section consists of: a table, a figure, or figures side by side."""
+"""A part of a section: a table, a figure, or several figures side by side."""
 
 _SHOWN_PAIRS = 40
 _PAIR_COLUMNS = (
@@ -45,7 +45,7 @@ _PAIR_COLUMNS = (
 
 @dataclass(frozen=True)
 class ReportSection:
-    """A headed part of the page; ``empty`` is said where it has nothing to show."""
+    """A section of the page; ``empty`` is shown if it has no content."""
 
     anchor: str
     title: str
@@ -61,7 +61,7 @@ def report_section(
     *parts: str | tuple[str, ...],
     empty: str,
 ) -> ReportSection:
-    """Return a section of results and figures by name: ``lengths``, ``figure:lengths``, or figures side by side as a tuple."""
+    """Return a section of results and figures by name: ``lengths``, ``figure:lengths``, or a tuple of figures side by side."""
     chosen: list[SectionPart] = []
     for part in parts:
         if isinstance(part, tuple):
@@ -75,9 +75,9 @@ def report_section(
 
 @dataclass(frozen=True)
 class Report:
-    """A report that can be written: ``lead`` are its first sentences, ``prelude`` the SQL that goes before every query.
+    """A report to write: ``lead`` are its first sentences, ``prelude`` the SQL macros before every query.
 
-    ``views`` says, as HTML, what that SQL asks. A figure is None where there is nothing to draw.
+    ``views`` names, as HTML, the tables that the SQL queries. A figure is None if there is nothing to draw.
     """
 
     title: str
@@ -89,9 +89,9 @@ class Report:
     sections: Sequence[ReportSection]
 
     def write(self, out: Path, **more: object) -> None:
-        """Write ``out/report.html``, ``out/statistics.json`` (with ``more`` in it) and ``out/figures/*.svg``.
+        """Write ``out/report.html``, ``out/statistics.json`` (including ``more``) and ``out/figures/*.svg``.
 
-        The same report gives the same bytes. Figures of an earlier report that this one does not have are removed.
+        Equal reports give equal bytes. Figures of an earlier report that this one lacks are removed.
         """
         (out / FIGURES).mkdir(parents=True, exist_ok=True)
         for name, figure in self.figures.items():
@@ -106,7 +106,7 @@ class Report:
 
 
 def write_or_remove(path: Path, content: bytes | None) -> None:
-    """Write a file, or remove it where there is no content for it."""
+    """Write a file, or remove it if ``content`` is None."""
     if content is None:
         path.unlink(missing_ok=True)
     else:
@@ -114,7 +114,7 @@ def write_or_remove(path: Path, content: bytes | None) -> None:
 
 
 class _Page:
-    """Number tables and figures as they come, and write them."""
+    """Writes the page, and numbers tables and figures in order."""
 
     def __init__(self, report: Report):
         self.report = report
@@ -182,7 +182,7 @@ class _Page:
     def _figure(self, figure: Figure) -> str:
         self.figures += 1
         queries = (self.report.results[name].query for name in figure.queries)
-        sql = "".join(_sql(query) for query in queries if not query.columns)  # a table has its own below it
+        sql = "".join(_sql(query) for query in queries if not query.columns)  # a table shows its own SQL
         return (
             f'<figure id="figure-{figure.name}">\n{for_page(figure.svg)}\n'
             f"<figcaption><b>Figure {self.figures}.</b> {escape(figure.caption)}</figcaption>\n{sql}</figure>\n"
@@ -202,7 +202,7 @@ def _cells(columns: Sequence[Column], row: Row) -> list[str]:
 
 
 def written(column: Column, row: Row) -> str:
-    """Return a cell's content as HTML."""
+    """Return the content of a cell as HTML."""
     value = row[column.name]
     if value is None:
         return MISSING
@@ -234,7 +234,7 @@ def _plain(column: Column, value: object) -> str:
 
 
 def _number(value: float) -> str:
-    """Write three digits that count; whole numbers whole."""
+    """Write a number with three significant digits; whole numbers and large numbers without decimals."""
     if value == round(value) or abs(value) >= 1000:
         return f"{value:,.0f}"
     return f"{value:#.3g}".rstrip(".")

@@ -1,4 +1,4 @@
-"""Queries of a report: the SQL of each, how its columns are read, and the DuckDB connection that answers them."""
+"""Report queries: SQL with display columns, and the DuckDB connection that runs them."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ CREATE OR REPLACE TEMP MACRO own(proposer) AS NOT unfiltered(proposer) AND NOT j
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the report: ``interval`` names the two columns that hold its 95 % interval.
+    """A column of the report; ``interval`` names the two columns with its 95 % interval.
 
-    A ``number`` is written with three digits that count; one that was ``given`` as it is.
+    A ``number`` is written with three significant digits, a ``given`` value as it is.
     """
 
     name: str
@@ -50,21 +50,21 @@ class Column:
 
 
 def labels(*names: str) -> tuple[Column, ...]:
-    """Return columns of text that are headed by their names."""
+    """Return text columns headed by their names."""
     return tuple(Column(name, name, "text") for name in names)
 
 
 def counts(*names: str) -> tuple[Column, ...]:
-    """Return columns of counts that are headed by their names."""
+    """Return count columns headed by their names."""
     return tuple(Column(name, name) for name in names)
 
 
 @dataclass(frozen=True)
 class Query:
-    """SQL (DuckDB, after ``tables.PRELUDE``) with the words that go with its result.
+    """SQL (DuckDB, run after ``PRELUDE``) with the texts shown with its result.
 
-    ``columns`` are those shown; without any, the result is drawn and not shown as a table. ``shown`` is the most rows that
-    the report shows: statistics.json has all.
+    ``columns`` are the displayed ones; without any, the result is only drawn. ``shown`` is the maximum number of displayed rows;
+    statistics.json has all rows.
     """
 
     name: str
@@ -77,14 +77,14 @@ class Query:
 
 @dataclass(frozen=True)
 class Result:
-    """A query and the rows it gave."""
+    """A query and its rows."""
 
     query: Query
     rows: list[Row]
 
     @property
     def only(self) -> Row:
-        """The one row of a result that has one row."""
+        """The single row of a result."""
         (row,) = self.rows
         return row
 
@@ -100,9 +100,9 @@ def summary(
     total: bool = False,
     note: str = "",
 ) -> Query:
-    """Return the query of the distributions of ``{quantity: expression}`` over the rows of a table, a row a quantity.
+    """Return the query of the distributions of ``{quantity: expression}`` over a table, one row per quantity.
 
-    ``rows`` heads the number of those that have it; the ``total`` is shown where adding up means something.
+    ``rows`` heads the number of non-null values; ``total`` adds the sum, for quantities that can be added.
     """
     names = sql_texts(quantities)
     values = ", ".join(f"({expression})::DOUBLE" for expression in quantities.values())
@@ -120,14 +120,14 @@ ORDER BY list_position([{names}], quantity)"""
 
 
 def histogram(name: str, caption: str, place: str, where: str, *, rows: str = "objects", table: str = "twins") -> Query:
-    """Return the query of how many ``rows`` of a table are at every place ``expression AS name``."""
+    """Return the query that counts the ``rows`` of a table per value of ``place``, given as ``expression AS name``."""
     key = place.rpartition(" ")[2]
     sql = f"SELECT {place}, count(*) AS {rows} FROM {table}\nWHERE {where} GROUP BY {key} ORDER BY {key}"
     return Query(name, caption, sql)
 
 
 class ReportTables:
-    """Answer a report's queries from named tables."""
+    """Runs a report's queries on named tables."""
 
     def __init__(
         self,
@@ -137,10 +137,11 @@ class ReportTables:
         file_system: AbstractFileSystem | None = None,
         remedy: str = "run manitwin check DATASET",
     ):
-        """Take for every table a pyarrow table, or SQL that yields it: ``read_parquet('...')``; ``prelude`` has the macros.
+        """Register each table, given as a pyarrow table or as SQL such as ``read_parquet('...')``; ``prelude`` defines the
+        macros.
 
-        ``file_system`` is what reads files that are not local. One thread: sums of floats then do not depend on which one
-        came first, and memory stays flat. ``remedy`` ends what is said of tables that cannot be read.
+        ``file_system`` reads non-local files. DuckDB uses a single thread, so that sums of floats do not depend on the order of
+        threads, and memory stays flat. ``remedy`` ends the error message for unreadable tables.
         """
         self._remedy = remedy
         self.connection = duckdb.connect()
@@ -159,7 +160,7 @@ class ReportTables:
 
     @classmethod
     def of_index(cls, root: DatasetRoot) -> ReportTables:
-        """Open a data set's index; raises UsageError where it has none."""
+        """Open a data set's index; raises UsageError if it has none."""
         found = Index(root).parts
         require_files(root, found)
         parts = found.parts
@@ -170,9 +171,9 @@ class ReportTables:
         return cls(tables, file_system=None if root.local is not None else root.fs, remedy=remedy_of(root))
 
     def result(self, query: Query) -> Result:
-        """Run a query; floats come with 12 digits, which do not depend on how rows are spread over files.
+        """Run a query. Floats are rounded to 12 digits, so that they do not depend on the distribution of rows over files.
 
-        Raises UsageError where a file has gone meanwhile.
+        Raises UsageError if a file has been replaced meanwhile, or cannot be read.
         """
         try:
             cursor = self.connection.execute(query.sql)
@@ -184,7 +185,7 @@ class ReportTables:
         except (duckdb.Error, MemoryError) as error:
             raise self._unreadable(error) from error
         except RuntimeError as error:
-            if "interrupt" in str(error).lower():  # DuckDB's words for what a signal's handler raised
+            if "interrupt" in str(error).lower():  # DuckDB's message when a signal handler raised
                 raise KeyboardInterrupt from error
             raise
         return Result(query, [dict(zip(names, map(_rounded, row), strict=True)) for row in rows])

@@ -1,4 +1,4 @@
-"""The report of a data set: ask the queries, draw the figures, and put both into sections."""
+"""Report of a data set: run the queries, draw the figures, and arrange both in sections."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from manitwin.dataset.statistics.style import Figure, drawing
 from manitwin.twin.dataset_root import DatasetRoot
 
 MOST_PAIRS = 1000
-"""So many pairs of near-duplicates are written, the nearest; the call that finds all is written with them."""
+"""Maximum number of near-duplicate pairs written, nearest first, with the call that finds all of them."""
 NO_TWIN = "There is no accepted twin."
 VIEWS = "the views twins, points, grasps, placements, rejections and stages of the data set’s index"
 
@@ -34,14 +34,14 @@ QUERIES: tuple[Query, ...] = (
     *(stages.COST, stages.COST_BY_STAGE, stages.BACKENDS),
     *(stages.SOURCES, stages.LICENCES, stages.SAME_SOURCE, stages.FINDINGS, stages.CONFIGURATIONS),
 )
-"""All queries but ``mass_in_prior``, whose priors are those of the categories found."""
+"""All queries except ``mass_in_prior``, which depends on the categories found."""
 
 
 @dataclass(frozen=True)
 class WrittenReport:
-    """A report that is in its place: the path or URL of its page, and its first sentence without the full stop.
+    """A written report: the path or URL of its page, and its first sentence without the full stop.
 
-    ``text`` are the main numbers of a report on episodes as lines; of a data set's there is none.
+    ``text`` has the main numbers of a report on episodes as lines; empty for data sets.
     """
 
     page: str
@@ -50,9 +50,9 @@ class WrittenReport:
 
 
 def write_dataset_report(root: DatasetRoot, out: Path | None = None) -> WrittenReport:
-    """Write the report of a data set to a folder, by default ``statistics/`` of the data set.
+    """Write the report of a data set to a folder, by default ``statistics/`` in the data set.
 
-    Raises UsageError where the data set has no index.
+    Raises UsageError if the data set has no index.
     """
     tables = ReportTables.of_index(root)
     duplicates = near_duplicates(Index(root))
@@ -76,7 +76,7 @@ def collect(tables: ReportTables) -> dict[str, Result]:
 
 
 def write_report(tables: ReportTables, out: Path, *, title: str, duplicates: NearDuplicates | None = None) -> str:
-    """Write the report of tables into a folder; return the page's first sentence. The same tables give the same bytes."""
+    """Write the report of tables to a folder; return the page's first sentence. Equal tables give equal bytes."""
     results = collect(tables)
     near = None if duplicates is None else _near_pairs(duplicates)
     with drawing():
@@ -88,7 +88,7 @@ def write_report(tables: ReportTables, out: Path, *, title: str, duplicates: Nea
 
 
 def draw(results: dict[str, Result]) -> dict[str, Figure | None]:
-    """Return all figures by name, None where there is nothing to draw."""
+    """Return all figures by name, None if there is nothing to draw."""
     of = results.__getitem__
     of_size, of_mass = ((of(name), of("dimensions")) for name in ("size_histogram", "mass_histogram"))
     figures = {
@@ -168,7 +168,7 @@ def _near_pairs(duplicates: NearDuplicates) -> NearPairs:
 
 
 def _lead(results: dict[str, Result]) -> list[str]:
-    """Return the report in two sentences."""
+    """Return the summary of the report in at most two sentences."""
     totals, rate = results["totals"].only, results["verification_rate"].rows
     if not totals["items"]:
         return ["No item has ended yet: there is nothing to count."]

@@ -1,4 +1,4 @@
-"""Queries about stages: accepted and rejected by stage, reason, source and configuration; time and money by stage."""
+"""Stage queries: accepted and rejected items by stage, reason, source and configuration; time and cost by stage."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from manitwin.pipeline.stage_order import STAGE_ORDER
 from manitwin.twin.record import REJECTION_REASONS
 
 STAGES = tuple(REJECTION_REASONS)
-"""The stages that can reject, in their order: those of the record's schema."""
+"""The stages that can reject, in the order of the record's schema."""
 
 _ITEM_COLUMNS = (
     *counts("items", "accepted", "rejected"),
@@ -131,7 +131,7 @@ GROUP BY source_sha256 HAVING count(*) > 1 ORDER BY items DESC, source_sha256"""
 
 
 _PLACE = f"list_position([{', '.join(map(sql_text, STAGE_ORDER))}], split_part(stage, '-', 1))"
-"""A stage's place in the pipeline; the stages of further grippers (``verify-robotiq_2f85``) stand by the first one's."""
+"""Position of a stage in the pipeline; stages of further grippers (``verify-robotiq_2f85``) share that of the first gripper."""
 
 COST_BY_STAGE = Query(
     "cost_by_stage",

@@ -1,4 +1,4 @@
-"""The look of figures: one palette, one type size, and SVG that is the same bytes every time."""
+"""Style of figures: one palette, one font size, and byte-reproducible SVG."""
 
 from __future__ import annotations
 
@@ -33,15 +33,16 @@ VARIABLES = {
     "#3399bb": "cyan",
     "#8d959e": "grey",
 }
-"""The style sheet's variables by colour: in the page, colours follow light and dark.
+"""Style sheet variables by colour; in the page, colours follow the light or dark theme.
 
-After Paul Tol's bright scheme (Colour Schemes, SRON/EPS/TN/09-002), told apart by the colour-blind; yellow, cyan and grey
-darker, so that words in them can be read on white."""
+After Paul Tol's bright scheme (Colour Schemes, SRON/EPS/TN/09-002), which is colour-blind safe; yellow, cyan and grey are darker,
+so that text in them is readable on white.
+"""
 INK, MUTED, GRID, SURFACE, BLUE, RED, GREEN, YELLOW, PURPLE, CYAN, GREY = VARIABLES
 
 FONT = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 FULL_IN, HALF_IN = 7.6, 3.7
-"""Widths of figures, inch: of the page's column, and of half of it."""
+"""Figure widths in inches: of the page column, and of half of it."""
 
 _RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -62,15 +63,15 @@ _RC: dict[Any, Any] = {
     "grid.linewidth": 0.6,
     "legend.frameon": False,
     "figure.constrained_layout.use": True,
-    "svg.fonttype": "none",  # words stay words: they can be searched, read aloud, and shown in any script the reader has
+    "svg.fonttype": "none",  # text stays text: it can be searched, read aloud, and shown in any script
     "svg.hashsalt": "manitwin",
-    "text.parse_math": False,  # a dollar sign in a category is a dollar sign
+    "text.parse_math": False,  # a dollar sign in a category is literal
 }
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: ``svg`` stands alone; ``alt`` says in words what it shows; ``queries`` name where its numbers are."""
+    """A figure: ``svg`` is self-contained, ``alt`` describes it in words, ``queries`` name the sources of its numbers."""
 
     name: str
     caption: str
@@ -81,11 +82,11 @@ class Figure:
 
 @contextmanager
 def drawing() -> Iterator[None]:
-    """Draw in the report's style, whatever the reader's matplotlib settings are."""
+    """Apply the report's style, independent of the user's matplotlib settings."""
     with matplotlib.rc_context(), warnings.catch_warnings():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_RC)
-        # words stay words: only their widths are guessed where this font lacks a letter
+        # Text stays text: for glyphs missing in this font, only the widths are estimated.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         yield
 
@@ -98,7 +99,7 @@ def canvas(width_in: float, height_in: float, columns: int = 1) -> tuple[Canvas,
 
 
 def row_canvas(labels: Sequence[str], row_in: float = 0.22, frame_in: float = 0.75) -> tuple[Canvas, Axes]:
-    """Return an empty figure with a row a label, the first on top."""
+    """Return an empty figure with one row per label, the first on top."""
     figure, (axis,) = canvas(FULL_IN, frame_in + row_in * max(len(labels), 2))
     axis.set_yticks(range(len(labels)), labels)
     axis.set_ylim(len(labels) - 0.4, -0.6)
@@ -107,9 +108,9 @@ def row_canvas(labels: Sequence[str], row_in: float = 0.22, frame_in: float = 0.
 
 
 def finished(figure: Canvas | str, name: str, caption: str, alt: str, *results: Result) -> Figure:
-    """Return a figure of results, from what was drawn or SVG, without its prologue and dates.
+    """Return a figure of results from a drawn canvas or SVG, without XML prologue and dates.
 
-    It has own ids, the report's font and a description for who cannot see it.
+    Ids are made unique, the report's font is set, and a text description is added.
     """
     svg = figure if isinstance(figure, str) else _svg(figure)
     body = re.sub(r"<metadata>.*?</metadata>\s*", "", svg[svg.index("<svg") :], flags=re.DOTALL)
@@ -135,7 +136,7 @@ def _svg(figure: Canvas) -> str:
 
 
 def for_page(svg: str) -> str:
-    """Return SVG whose colours are the page's variables."""
+    """Return SVG with its colours replaced by the page's CSS variables."""
 
     def variables(tag: str) -> str:
         for color, name in VARIABLES.items():
@@ -146,33 +147,33 @@ def for_page(svg: str) -> str:
 
 
 def _in_tags(svg: str, change: Callable[[str], str]) -> str:
-    """Change tags alone: words between them are other people's."""
+    """Apply ``change`` to the tags only; the text between them is data."""
     return re.sub(r"<[a-z][^<>]*>", lambda tag: change(tag[0]), svg)
 
 
 def shortened(words: str, most: int = 36) -> str:
-    """Return words that fit beside an axis, on one line."""
+    """Return a text on one line, shortened to fit beside an axis."""
     line = one_line(words)
     return line if len(line) <= most else line[: most - 1].rstrip() + "…"
 
 
 def plain_number(value: float) -> str:
-    """Return a number as on an axis: 0.05, 2, 1,500."""
+    """Return a number as an axis label: 0.05, 2, 1,500."""
     return f"{value:,.0f}" if value >= 10 else f"{value:.4g}"
 
 
 def beside_bar(axis: Axes, end: float, row: float, words: str) -> None:
-    """Write beside the end of a horizontal bar."""
+    """Write a text beside the end of a horizontal bar."""
     axis.annotate(words, (end, row), (3, 0), textcoords="offset points", va="center")
 
 
 def legend_above(axis: Axes, columns: int, **more: Any) -> None:
-    """Put the legend above an axis, from its left end."""
+    """Place the legend above an axis, left-aligned."""
     axis.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=columns, borderaxespad=0.2, **more)
 
 
 def count_axis(axis: Axes, which: Literal["x", "y"], label: str) -> None:
-    """Make an axis one of whole numbers from 0, with a grid."""
+    """Format an axis for counts: integers from 0, with a grid."""
     chosen = axis.xaxis if which == "x" else axis.yaxis
     chosen.set_major_locator(MaxNLocator(integer=True, nbins=6))
     chosen.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
@@ -182,7 +183,7 @@ def count_axis(axis: Axes, which: Literal["x", "y"], label: str) -> None:
 
 
 def logarithmic_axis(axis: Axes, which: str, label: str) -> None:
-    """Make an axis logarithmic, its ticks as close as its length allows and written plainly."""
+    """Make an axis logarithmic, with plain tick labels as dense as its range allows."""
     (axis.set_xscale if which == "x" else axis.set_yscale)("log")
     chosen = axis.xaxis if which == "x" else axis.yaxis
     low, high = axis.get_xlim() if which == "x" else axis.get_ylim()

@@ -1,1 +1,1 @@
-"""The figures of the report, drawn from the rows of its queries."""
+"""Figures of the report, drawn from query results."""

@@ -1,4 +1,4 @@
-"""Horizontal bars: stages, reasons, outcomes, categories, cost."""
+"""Horizontal bar charts: stages, rejection reasons, outcomes, categories, cost."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_CATEGORIES, MOST_REASONS = 40, 20
 
 
 def success_by_stage(result: Result) -> Figure | None:
-    """Draw what passed and what was rejected at every stage; None where nothing was given."""
+    """Draw the passed and rejected items of every stage; None if there are no items."""
     rows = [row for row in result.rows if row["entered"]]
     if not rows:
         return None
@@ -57,7 +57,7 @@ def rejections(result: Result) -> Figure | None:
 
 
 def outcomes(result: Result) -> Figure | None:
-    """Draw how grasps fail: of the filtered ones and of the unfiltered sample, as shares of the failed."""
+    """Draw the failure modes of filtered grasps and of the unfiltered sample, as shares of the failed grasps."""
     rows = result.rows
     if not rows:
         return None

@@ -1,4 +1,4 @@
-"""Histograms: grasps per object, rates, counts of points, sizes and masses."""
+"""Histograms: grasps per object, rates, numbers of points, sizes and masses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _BIN = 5
 
 
 def grasps_per_object(simulated: Result, verified: Result) -> Figure | None:
-    """Draw how many grasps of an object were simulated and verified."""
+    """Draw the numbers of simulated and verified grasps per object."""
     if not simulated.rows:
         return None
     figure, (axis,) = canvas(FULL_IN, _HEIGHT_IN)
@@ -48,7 +48,7 @@ def grasps_per_object(simulated: Result, verified: Result) -> Figure | None:
 
 
 def counts_per_object(results: Sequence[Result]) -> Figure | None:
-    """Draw how many functional points, grasp points and placements objects have."""
+    """Draw the numbers of functional points, grasp points and placements per object."""
     if not any(result.rows for result in results):
         return None
     figure, axes = canvas(FULL_IN, 2.1, len(results))
@@ -67,7 +67,7 @@ def counts_per_object(results: Sequence[Result]) -> Figure | None:
 
 
 def logarithmic(result: Result, dimensions: Result, steps: int, name: str, quantity: str, unit: str) -> Figure | None:
-    """Draw a quantity of objects on a logarithmic axis, in so many steps a decade, with its median."""
+    """Draw the distribution of a quantity on a logarithmic axis with ``steps`` bins per decade, and its median."""
     if not result.rows:
         return None
     figure, (axis,) = canvas(HALF_IN, _HEIGHT_IN)
@@ -107,7 +107,7 @@ def shares(result: Result, name: str, caption: str, label: str, what: str, steps
 
 
 def _heights(result: Result, key: str, at: np.ndarray) -> list[int]:
-    """Return the counts at the places of a histogram, 0 where the query has no row."""
+    """Return the counts at the bins of a histogram, 0 for bins without a row."""
     (counted,) = set(result.rows[0]) - {key} if result.rows else {""}
     found = {row[key]: row[counted] for row in result.rows}
     return [found.get(int(place), 0) for place in at]

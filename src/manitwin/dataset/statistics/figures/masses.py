@@ -1,4 +1,4 @@
-"""Mass against size and against the priors of the categories."""
+"""Scatter and interval plots of mass against size and against the priors of the categories."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _ANOTHER = (GREY, "v")
 
 
 def mass_and_size(sample: Result, priors: Result) -> Figure | None:
-    """Draw mass against the longest side, by who says the mass, over the priors' intervals of both."""
+    """Draw mass against the longest side, coloured by the source of the mass, over the priors' intervals of both."""
     rows = sample.rows
     if not rows:
         return None
@@ -53,7 +53,7 @@ def mass_and_size(sample: Result, priors: Result) -> Figure | None:
     present = [*(source for source in _SOURCES if source in said), *sorted(said - set(_SOURCES))]
     if len(rows) <= _MOST_INTERVALS:
         _points_with_intervals(axis, rows, present)
-    else:  # in the sample's order, so that no source hides another
+    else:  # drawn in sample order, so that no source hides another
         colors = [_SOURCES.get(row["source"], _ANOTHER)[0] for row in rows]
         places = [row["longest_m"] for row in rows], [row["mass_kg"] for row in rows]
         axis.scatter(*places, s=8, c=colors, alpha=0.7, linewidths=0, zorder=3)
@@ -112,7 +112,7 @@ def _legend(present: list[str], count: int, priors: bool) -> list[Line2D | Patch
 
 
 def mass_by_category(priors: Result) -> Figure | None:
-    """Draw the twins' masses category by category beside the prior's interval."""
+    """Draw the twins' masses per category beside the interval of the prior."""
     rows = priors.rows[:_MOST_CATEGORIES]
     if not rows:
         return None

@@ -1,4 +1,4 @@
-"""Word clouds of the six attributes, as SVG whose words are words."""
+"""Word clouds of the six attributes as SVG with real text."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ _PIXELS_PER_PT, _LEAST_PIXELS, _MOST_PIXELS, _MOST_WORDS = 2, 15, 84, 100
 _COLORS = (BLUE, GREEN, RED, PURPLE, CYAN, YELLOW)
 _TOLD = 8
 _NARROWER = 0.88
-"""Width of words in Helvetica and Arial, which readers have, to that in DejaVu Sans, which they are placed by."""
+"""Width ratio of text in Helvetica and Arial, used by viewers, to DejaVu Sans, used for the layout."""
 
 
 def word_cloud(result: Result, attribute: str) -> Figure | None:
-    """Draw an attribute's terms, larger the more twins have them; None where there is none.
+    """Draw the terms of an attribute, sized by the number of twins; None if there are none.
 
-    Placed by the ``wordcloud`` library with seed ``SEED``; all words lie flat.
+    The ``wordcloud`` library computes the layout with seed ``SEED``; all words are horizontal.
     """
     counts: dict[str, int] = {}
-    for row in result.rows[:_MOST_WORDS]:  # of two that are cut to the same words, the more frequent counts
+    for row in result.rows[:_MOST_WORDS]:  # of terms with equal shortened text, the most frequent counts
         counts.setdefault(shortened(row["term"], 32), row["twins"])
     counts.pop("", None)
     if not counts:
@@ -59,7 +59,7 @@ def word_cloud(result: Result, attribute: str) -> Figure | None:
 
 
 def _placed(counts: dict[str, int], width: int, height: int) -> list[str]:
-    """Return SVG text elements for the words, most frequent first, in the middle of ``width`` x ``height`` pixels."""
+    """Return SVG text elements for the words, most frequent first, centred in ``width`` x ``height`` pixels."""
     font_file = font_manager.findfont("DejaVu Sans")
     cloud = WordCloud(
         font_path=font_file, width=width, height=height, margin=6, prefer_horizontal=1.0,
@@ -70,7 +70,7 @@ def _placed(counts: dict[str, int], width: int, height: int) -> list[str]:
     words = []
     for (word, _), size, (top, left), _, _ in cloud.layout_:
         font = ImageFont.truetype(font_file, size)
-        ink = font.getbbox(word, anchor="ls")  # the library draws without its offsets: the ink begins at (left, top)
+        ink = font.getbbox(word, anchor="ls")  # the library draws without font offsets: the ink begins at (left, top)
         words.append((word, size, left + (ink[2] - ink[0]) / 2, top - ink[1], font.getlength(word), ink))
     down = (height - min(b + ink[1] for *_, b, _, ink in words) - max(b + ink[3] for *_, b, _, ink in words)) / 2
     right = (width - min(x - n / 2 for *_, x, _, n, _ in words) - max(x + n / 2 for *_, x, _, n, _ in words)) / 2
