@@ -1,1 +1,1 @@
-"""Local servers that keep the contracts of services of others, and fail as those do: to test against, and to rehearse."""
+"""Local fake servers of third-party services, including their failure modes, for tests and rehearsals without accounts."""

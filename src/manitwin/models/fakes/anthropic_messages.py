@@ -1,10 +1,10 @@
-"""A fake of Anthropic's Messages API.
+"""Fake server of Anthropic's Messages API.
 
 Contract: https://docs.claude.com/en/api/messages, errors https://docs.claude.com/en/api/errors, pictures
 https://docs.claude.com/en/docs/vision, ``output_config.format``
-https://platform.claude.com/docs/en/build-with-claude/structured-outputs (2026). An empty account is refused as in
-https://github.com/anthropics/claude-code/issues/66314, a temperature as in https://github.com/RooCodeInc/Roo-Code/issues/12162.
-Unverified: the words of the errors for missing headers and pictures.
+https://platform.claude.com/docs/en/build-with-claude/structured-outputs (2026). The refusal of an account without credit follows
+https://github.com/anthropics/claude-code/issues/66314, that of a temperature https://github.com/RooCodeInc/Roo-Code/issues/12162.
+Unverified: the error messages for missing headers and invalid pictures.
 """
 
 from __future__ import annotations
@@ -32,10 +32,11 @@ _STOPPED = {"end": "end_turn", "length": "max_tokens", "refusal": "refusal"}
 
 
 class FakeAnthropic:
-    """Messages at ``/v1/messages``.
+    """Messages API at ``/v1/messages``.
 
-    ``models`` are those that are there (any, without it); ``structured`` tells whether they have structured outputs, and
-    ``sampling`` whether they take a temperature. ``retry_after`` is the header of a fault ``rate_limited``.
+    ``models`` lists the available models (default: any), ``structured`` whether they support structured outputs, ``sampling``
+    whether they accept a temperature. ``retry_after`` is the header value of the fault ``rate_limited``; ``hang_s`` is the
+    duration of the fault ``hangs``.
     """
 
     def __init__(

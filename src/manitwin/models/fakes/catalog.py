@@ -1,4 +1,4 @@
-"""The rehearsal servers by name: what they are started with, and what a client has to be told."""
+"""Registry of the rehearsal servers: their classes, and the options and keys that their clients need."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from manitwin.models.fakes.server import FakeServer
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """A server that can be rehearsed with.
+    """A rehearsal server.
 
-    ``option`` is the command line's for such a backend, ``spec`` what to give there (``{url}``: the server's address), and
-    ``key_variable`` where its client looks for a key (None: it has none). ``command`` is what takes the option.
+    ``option`` is the command-line option of the backend and ``spec`` its value (``{url}`` is replaced by the server's address).
+    ``key_variable`` is the environment variable of the client's key (None if no key is used). ``command`` takes the option.
     """
 
     target: str
@@ -36,7 +36,7 @@ class Rehearsal:
         return getattr(import_module(module), attribute)
 
 
-# A vendor's own key goes to the vendor's host only: that of another server of VLMs is in another variable.
+# A vendor's own key variable is only used for the vendor's host; keys of other VLM servers are in MANITWIN_VLM_KEY.
 REHEARSALS = {
     "openai": Rehearsal(
         "manitwin.models.fakes.openai_chat:FakeOpenAi", "--vlm", "openai:rehearsal@{url}/v1", "MANITWIN_VLM_KEY"
@@ -64,7 +64,7 @@ REHEARSALS = {
 
 @dataclass(frozen=True)
 class Serving:
-    """A server that runs: where, with which key (None: it asks for none), and what to give a build."""
+    """A running server: its address, its key (None if it needs none), and the option to pass to a build."""
 
     url: str
     key: str | None
@@ -78,9 +78,9 @@ class Serving:
 def serving(
     name: str, *, port: int = 0, faults: Faults | None = None, key: str | None = None, polls: int | None = None
 ) -> Iterator[Serving]:
-    """Serve ``name`` on this machine while the context lasts; raises UsageError for what it cannot be started with.
+    """Run the server ``name`` on this machine within the context; raises UsageError for invalid arguments.
 
-    ``polls`` is how often a job is looked at before it is done.
+    ``polls`` is the number of status requests until a job is done.
     """
     if name not in REHEARSALS:
         raise UsageError(choose_from("server", name, REHEARSALS))
@@ -101,7 +101,7 @@ def serving(
 
 
 def _server(factory: Callable[..., Any], given: dict[str, Any], port: int) -> MessageServer | FakeServer:
-    if "port" in inspect.signature(factory).parameters:  # a server by itself, not a service for one
+    if "port" in inspect.signature(factory).parameters:  # it is a server itself, not a service for an HTTP server
         return factory(**given, port=port)
     try:
         return FakeServer(factory(**given), port)

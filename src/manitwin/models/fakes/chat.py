@@ -1,4 +1,4 @@
-"""Shared parts of the fakes of both chat protocols: requests, faulty answers, and the JSON schemas that each vendor takes."""
+"""Shared parts of the fake chat servers: parsed requests, faulty answers, and the JSON schema subset of each vendor."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ from PIL import Image
 from manitwin.models.fakes.faults import Faults
 
 Answer = Callable[[str, dict[str, Any], str, list[bytes]], dict[str, Any]]
-"""Answers a question: the schema's name (its title where the protocol has no other), the schema, all that was said, the
-pictures."""
+"""Answers a question, given the schema's name (its title if the protocol has no other), the schema, the concatenated texts and
+the pictures.
+"""
 
-# the four types that both vendors read: https://docs.claude.com/en/docs/vision, https://platform.openai.com/docs/guides/images-vision
+# The four types that both vendors accept: https://docs.claude.com/en/docs/vision,
+# https://platform.openai.com/docs/guides/images-vision
 PICTURE_FORMATS = {"image/png": "PNG", "image/jpeg": "JPEG", "image/webp": "WEBP", "image/gif": "GIF"}
 _SHARED = {
     "type", "description", "title", "enum", "const", "anyOf", "properties", "required", "items", "$ref", "$defs",
@@ -37,7 +39,7 @@ MAX_DEPTH = 10
 
 @dataclass
 class ChatRequest:
-    """A request as it was read: texts in order, pictures, and the schema of the answer."""
+    """A parsed request: texts in order, pictures, and the schema of the answer."""
 
     texts: list[str] = field(default_factory=list)
     pictures: list[bytes] = field(default_factory=list)
@@ -46,7 +48,7 @@ class ChatRequest:
     schema: dict[str, Any] | None = None
 
     def picture(self, mime: str, encoded: str) -> str | None:
-        """Take in a picture in base64; return what is wrong with it."""
+        """Add a base64 picture; return an error message if it is invalid."""
         try:
             data = base64.b64decode(encoded, validate=True)
             with Image.open(io.BytesIO(data)) as image:
@@ -61,7 +63,7 @@ class ChatRequest:
         return None
 
     def tokens(self) -> int:
-        """Return about how many tokens it has: 4 characters each, and one for each 28 x 28 pixels of a picture."""
+        """Return an estimate of the number of tokens: one per 4 characters, and one per 28 x 28 pixels of a picture."""
         pixels = 0
         for data in self.pictures:
             with Image.open(io.BytesIO(data)) as image:
@@ -71,19 +73,19 @@ class ChatRequest:
 
 @dataclass(frozen=True)
 class WrittenAnswer:
-    """A model's answer: ``stopped`` is ``end``, ``length`` or ``refusal``."""
+    """A model's answer; ``stopped`` is ``end``, ``length`` or ``refusal``."""
 
     text: str
     stopped: str = "end"
 
     @property
     def tokens(self) -> int:
-        """About how many tokens it has."""
+        """Estimated number of tokens."""
         return math.ceil(len(self.text) / 4)
 
 
 def write(asked: ChatRequest, answer: Answer, faults: Faults) -> WrittenAnswer:
-    """Answer what was asked, with the faults that strike."""
+    """Answer a request, applying pending faults."""
     schema = asked.schema or schema_in(asked.texts)
     if faults.strike("refusal"):
         return WrittenAnswer("I'm sorry, but I can't help with that.", "refusal")
@@ -101,7 +103,7 @@ def write(asked: ChatRequest, answer: Answer, faults: Faults) -> WrittenAnswer:
 
 
 def schema_in(texts: list[str]) -> dict[str, Any] | None:
-    """Return the JSON schema of an object that stands in a text, where none is given otherwise."""
+    """Return the first JSON schema of an object that is embedded in a text, for requests without a schema field."""
     for text in texts:
         start = text.find("{")
         while start >= 0:
@@ -116,12 +118,12 @@ def schema_in(texts: list[str]) -> dict[str, Any] | None:
 
 
 def hang(seconds: float) -> None:
-    """Keep whoever asked waiting."""
+    """Delay the answer."""
     threading.Event().wait(seconds)
 
 
 def _far_too_heavy(value: Any, mass: bool = False) -> Any:
-    """Return an answer whose masses (keys that end in ``_kg``) are a thousand times theirs."""
+    """Return an answer with all masses (keys that end in ``_kg``) multiplied by a thousand."""
     if isinstance(value, dict):
         return {key: _far_too_heavy(part, mass or key.endswith("_kg")) for key, part in value.items()}
     if isinstance(value, list):
@@ -130,7 +132,7 @@ def _far_too_heavy(value: Any, mass: bool = False) -> Any:
 
 
 def openai_complaint(schema: dict[str, Any]) -> str | None:
-    """Return what OpenAI's strict mode says against a schema, None where it takes it."""
+    """Return the error message of OpenAI's strict mode for a schema; None if it is valid."""
     if schema.get("type") != "object":
         return f"schema must be a JSON Schema of 'type: \"object\"', got 'type: \"{schema.get('type')}\"'."
     properties = values = 0
@@ -157,7 +159,7 @@ def openai_complaint(schema: dict[str, Any]) -> str | None:
 
 
 def anthropic_complaint(schema: dict[str, Any]) -> str | None:
-    """Return what Anthropic says against a schema, None where it takes it."""
+    """Return Anthropic's error message for a schema; None if it is valid."""
     for _, part, _ in _parts(schema, (), 1):
         kind = part.get("type", "schema")
         if kind == "object" and part.get("additionalProperties") is not False:

@@ -1,4 +1,4 @@
-"""A fake of the embeddings API: a text's vector counts its words, so that texts that share words are near.
+"""Fake of OpenAI's embeddings API with bag-of-words vectors, so that texts that share words are similar.
 
 Contract: https://platform.openai.com/docs/api-reference/embeddings/create, fields as of the ``openai`` package 3.52 (2026).
 """
@@ -17,7 +17,7 @@ FIELDS = frozenset({"input", "model", "dimensions", "encoding_format", "user"})
 
 
 def embeddings_response(request: Request) -> Response:
-    """Answer ``POST /v1/embeddings`` with a vector of 64 numbers for each text."""
+    """Answer ``POST /v1/embeddings`` with a vector of 64 numbers per text."""
     try:
         body = request.json()
     except ValueError:
@@ -45,7 +45,7 @@ def _refused(message: str) -> Response:
 
 
 def vector_of(text: str) -> list[float]:
-    """Return a unit vector of the words of a text; the first number is the same for all."""
+    """Return a unit vector of hashed word counts; its first component counts 1 for every text."""
     counts = [1.0] + [0.0] * (LENGTH - 1)
     for word in re.findall(r"\w+", text.lower()):
         counts[1 + zlib.crc32(word.encode()) % (LENGTH - 1)] += 1.0

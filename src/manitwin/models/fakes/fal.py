@@ -1,11 +1,11 @@
-"""A server that keeps the contract of fal's queue, with four endpoints behind it.
+"""Fake server of fal's queue API with four endpoints.
 
-Queue: https://fal.ai/docs/api-reference/inference-api (202 while under way, 200 when complete; the addresses of a request use the
+Queue: https://fal.ai/docs/api-reference/inference-api (202 while under way, 200 when complete; the URLs of a request contain the
 owner and the app only) and https://docs.fal.ai/model-endpoints/queue. Errors: .../documentation/model-apis/request-errors (flat,
-with ``error_type``) and a list under ``detail`` for what the model refuses; an empty account as in github.com/fal-ai/fal issue
-1147. Endpoints: https://fal.ai/models/fal-ai/trellis/multi/llms.txt (fields of trellis), .../hyper3d/rodin/llms.txt and
-.../hunyuan3d-v3/text-to-3d/api. Read 2026-11. Not documented, and chosen here: the words of 401 and 404, the 400 of a result
-that is asked for too early, and that the app refuses fields it does not know.
+with ``error_type``) and a list under ``detail`` for requests that the model refuses; the refusal of an account without credit is
+that of github.com/fal-ai/fal issue 1147. Endpoints: https://fal.ai/models/fal-ai/trellis/multi/llms.txt (fields of trellis),
+.../hyper3d/rodin/llms.txt and .../hunyuan3d-v3/text-to-3d/api. Read 2026-11. Undocumented, and assumed here: the messages of 401
+and 404, the 400 for a result that is requested too early, and the refusal of unknown fields.
 """
 
 from __future__ import annotations
@@ -91,10 +91,9 @@ class _Request:
 
 
 class FakeFal(FakeVendor):
-    """fal's queue on this machine: a request is complete after ``polls`` looks at its status.
+    """fal's queue on this machine; a request completes after ``polls`` status requests.
 
-    ``names`` are the addresses that a submitted request is told to ask, instead of this server's: for a reply that leads
-    elsewhere.
+    ``names`` overrides URLs in the reply to a submission, to simulate a reply that leads to another host.
     """
 
     refusals = REFUSALS
@@ -109,19 +108,19 @@ class FakeFal(FakeVendor):
 
     @property
     def submitted(self) -> int:
-        """The number of requests that were taken, and so charged."""
+        """Number of accepted, and so charged, requests."""
         return len(self._requests)
 
     def authorization(self) -> str:
-        """Return the header that holds the key."""
+        """Return the authorization header with the key."""
         return f"Key {self.key}"
 
     def seed_of(self, job: str) -> int | None:
-        """Return the seed of a request's mesh; None where there is no such request."""
+        """Return the seed of a request's mesh; None for an unknown request."""
         return self._requests[job].seed if job in self._requests else None
 
     def api(self, request: Request, base_url: str) -> Response:
-        """Answer a request that has the right key."""
+        """Answer an authorized request."""
         place = request.path.strip("/")
         if request.method == "POST":
             return self._submit(request, place, base_url)

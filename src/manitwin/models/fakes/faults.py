@@ -1,4 +1,4 @@
-"""Faults that a fake service shows on purpose."""
+"""Fault injection for the fake services."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ALWAYS = -1
 
 
 class Faults:
-    """The number of times that each fault is still to happen (``ALWAYS``: every time); safe to use from several threads.
+    """Number of pending occurrences per fault (``ALWAYS``: unlimited). Thread-safe.
 
     Raises UsageError for an unknown name.
     """
@@ -52,7 +52,7 @@ class Faults:
 
     @classmethod
     def parse(cls, words: Iterable[str]) -> Faults:
-        """Read ``name`` (always) or ``name=times``."""
+        """Parse words of the form ``name`` (always) or ``name=times``."""
         times: dict[str, int] = {}
         for word in words:
             name, _, count = word.partition("=")
@@ -62,7 +62,7 @@ class Faults:
         return cls(times)
 
     def strike(self, name: str) -> bool:
-        """Tell whether a fault happens now, and count it."""
+        """Return whether a fault occurs now, and decrease its count."""
         if name not in FAULTS:
             raise UsageError(choose_from("fault", name, FAULTS))
         with self._lock:
@@ -72,6 +72,6 @@ class Faults:
             return left != 0
 
     def stop(self, name: str) -> None:
-        """Let a fault happen no more."""
+        """Disable a fault."""
         with self._lock:
             self._left.pop(name, None)

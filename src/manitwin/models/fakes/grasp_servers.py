@@ -1,8 +1,8 @@
-"""Fakes of the servers of GraspGen and GraspGenX, as far as their clients can tell: actions, fields, defaults and errors.
+"""Fake servers of GraspGen and GraspGenX with the original actions, fields, defaults and errors.
 
-They keep the contracts of ``grasp_gen/serving/zmq_server.py`` of github.com/NVlabs/GraspGen and of
-``graspgenx/serving/{zmq_server,types}.py`` of github.com/NVlabs/GraspGenX as read in 2026-11. No model: grasps are facing
-pairs of points of the cloud.
+The contracts are those of ``grasp_gen/serving/zmq_server.py`` of github.com/NVlabs/GraspGen and of
+``graspgenx/serving/{zmq_server,types}.py`` of github.com/NVlabs/GraspGenX as read in 2026-11. There is no learned model: grasps
+are antipodal point pairs of the cloud.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ TOPK_WITHOUT_THRESHOLD = 100
 ACTIONS = ("health", "metadata", "infer_object")
 BOXES = ("extents_open", "offset_open", "extents_mid", "offset_mid")
 PLANNERS = ("diffusion", "graspmoe")
-NEIGHBOURS = 12  # of the plane through a point
+NEIGHBOURS = 12  # number of points for the tangent plane of a point
 LEAST_FACING = 0.94  # cosine of 20 degrees
-BESIDE_M = 0.005  # how far beside a point's normal its partner may lie
+BESIDE_M = 0.005  # maximum distance of the partner from the line along a point's normal
 THINNEST_M = 0.001
 BLOCK = 256
 
 
 class FakeGraspGen(MessageServer):
-    """Serve grasps of the hand ``gripper_name``; faults are those of every message server, ``no_grasps``, ``wrong_schema``.
+    """Serve grasps of the hand ``gripper_name``. Faults: those of every message server, ``no_grasps`` and ``wrong_schema``.
 
-    As in the original, unknown fields are ignored, a threshold of -1 without a topk means the best hundred, and a model that
-    yields nothing makes an error of PyTorch. ``no_grasps`` takes turns: empty arrays, then the error. There is no key: ``key``
-    is there as in every fake, unused.
+    As in the original, unknown fields are ignored, a threshold of -1 without topk means the best hundred, and a model without
+    results causes a PyTorch error. ``no_grasps`` alternates between empty arrays and that error. ``key`` is unused; it exists for
+    uniformity with the other fakes.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class FakeGraspGen(MessageServer):
         super().__init__(self, self._faults, port)
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Answer as the original does."""
+        """Answer a request like the original."""
         action = request.get("action")
         if action == "health":
             return {"status": "ok"}
@@ -63,7 +63,7 @@ class FakeGraspGen(MessageServer):
         return {"error": f"Unknown action: {action}"}
 
     def error(self, error: Exception) -> dict[str, Any]:
-        """Return the message of what was raised."""
+        """Return the error message of an exception."""
         return {"error": str(error)}
 
     def _infer(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -92,10 +92,10 @@ class FakeGraspGen(MessageServer):
 
 
 class FakeGraspGenX(MessageServer):
-    """Serve grasps of any parallel gripper; faults are those of every message server, ``no_grasps``, ``wrong_schema``.
+    """Serve grasps of any parallel gripper. Faults: those of every message server, ``no_grasps`` and ``wrong_schema``.
 
-    Grasps are for a jaw of the size that is asked for. ``infer`` by a gripper's name and the actions on scenes are not there.
-    There is no key: ``key`` is there as in every fake, unused.
+    Grasps fit a jaw of the requested size. The action ``infer`` by gripper name and the scene actions are not implemented.
+    ``key`` is unused; it exists for uniformity with the other fakes.
     """
 
     def __init__(self, faults: Faults | None = None, key: str = "", port: int = 0):
@@ -103,7 +103,7 @@ class FakeGraspGenX(MessageServer):
         super().__init__(self, self._faults, port)
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Answer as the original does."""
+        """Answer a request like the original."""
         action = request.get("action")
         if action == "health":
             return {"status": "ok"}
@@ -126,7 +126,7 @@ class FakeGraspGenX(MessageServer):
         raise ValueError(f"Unknown action: {action!r}")
 
     def error(self, error: Exception) -> dict[str, Any]:
-        """Return the type and message of what was raised."""
+        """Return the type and message of an exception."""
         return {"error": f"{type(error).__name__}: {error}"}
 
     def _infer_object(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -158,7 +158,7 @@ class FakeGraspGenX(MessageServer):
 
 
 def _jaw(request: dict[str, Any]) -> Jaw:
-    """Return the jaw that the two boxes describe; raises ValueError where they are not as they have to be."""
+    """Return the jaw described by the two sweep volume boxes; raises ValueError if they are invalid."""
     if "gripper_name" in request:
         raise ValueError("Action 'infer_object' takes sweep-volume params only — 'gripper_name' is not accepted.")
     given = request.get("sweep_volume_params")
@@ -186,7 +186,7 @@ def _jaw(request: dict[str, Any]) -> Jaw:
 
 @dataclass(frozen=True)
 class Jaw:
-    """A parallel jaw: opening, depth of the fingertips' centre, and half of the pads' width and height, in m."""
+    """A parallel jaw: maximum opening, depth of the fingertip centre, and half the width and height of the pads, in metres."""
 
     opening_m: float
     tip_depth_m: float
@@ -197,9 +197,9 @@ FRANKA_PANDA = Jaw(0.080, 0.1034, (0.00875, 0.00925))
 
 
 def cloud_grasps(cloud: np.ndarray, count: int, jaw: Jaw) -> tuple[np.ndarray, np.ndarray]:
-    """Return poses ``(M, 4, 4) float32`` and scores ``(M,) float32`` in [0, 1], best first, at most ``count``.
+    """Return at most ``count`` poses ``(M, 4, 4) float32`` and scores ``(M,) float32`` in [0, 1], best first.
 
-    The same cloud gives the same grasps.
+    Equal clouds give equal grasps.
     """
     points = np.asarray(cloud, float)
     if len(points) < NEIGHBOURS:
@@ -219,15 +219,15 @@ def cloud_grasps(cloud: np.ndarray, count: int, jaw: Jaw) -> tuple[np.ndarray, n
 
 
 def _normals(points: np.ndarray) -> np.ndarray:
-    """Return unit normals ``(N, 3)``, of either sign: the least principal axis of each point's neighbours."""
+    """Return unit normals ``(N, 3)`` of arbitrary sign: the smallest principal axis of each point's neighbours."""
     around = points[cKDTree(points).query(points, NEIGHBOURS)[1]]
     centered = around - around.mean(1, keepdims=True)
     return np.linalg.svd(centered, full_matrices=False)[2][:, 2]
 
 
 def _pairs(points: np.ndarray, normals: np.ndarray, jaw: Jaw) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return indices of first points, the signed distance of their partner along the normal, and how well both face."""
-    centered = points - points.mean(0)  # for the squares below
+    """Return first-point indices, signed distances to the partner along the normal, and absolute cosines of both normals."""
+    centered = points - points.mean(0)  # improves the precision of the squared distances below
     square, found = (centered**2).sum(1), []
     for start in range(0, len(points), BLOCK):
         some, normal = centered[start : start + BLOCK], normals[start : start + BLOCK]
@@ -244,7 +244,9 @@ def _pairs(points: np.ndarray, normals: np.ndarray, jaw: Jaw) -> tuple[np.ndarra
 def _poses(
     first_m: np.ndarray, normals: np.ndarray, width_m: np.ndarray, jaw: Jaw, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return poses that close along the normal, their tips between both points, from any side."""
+    """Return gripper poses with X along the normal, the fingertips centred between both points, and random approach
+    directions.
+    """
     count = len(first_m)
     x = normals * np.sign(width_m)[:, None]
     z = rng.normal(size=(count, 3))
@@ -258,7 +260,7 @@ def _poses(
 
 
 def _blocked(points: np.ndarray, poses: np.ndarray, jaw: Jaw) -> np.ndarray:
-    """Tell of each pose whether points lie where the open fingers or the palm are."""
+    """Return for each pose whether points lie inside the open fingers or the palm."""
     rotation, origin = poses[:, :3, :3], poses[:, :3, 3]
     x, y, z = np.moveaxis(np.einsum("nki,npk->inp", rotation, points[None] - origin[:, None]), 0, 0)
     half_y, half_z = jaw.pad_m

@@ -1,9 +1,9 @@
-"""A server that keeps the contract of Hunyuan3D's own ``api_server.py``, 2.0 or 2.1, with its traps.
+"""Fake of Hunyuan3D's own ``api_server.py``, version 2.0 or 2.1, with its pitfalls.
 
 2.0: github.com/Tencent-Hunyuan/Hunyuan3D-2, api_server.py at 9cc41a37; 2.1: github.com/Tencent-Hunyuan/Hunyuan3D-2.1,
-api_server.py at 0406efee, api_models.py at 4ebf83bc, model_worker.py at 024fd427. Neither asks for a key nor rejects a field
-that it does not know. Every failure of ``/generate`` is a 404 with the same words; a failed ``/send`` is never told of; 2.1 says
-``completed`` of textured meshes only.
+api_server.py at 0406efee, api_models.py at 4ebf83bc, model_worker.py at 024fd427. Neither requires a key nor rejects unknown
+fields. Every failure of ``/generate`` is a 404 with the same message; a failed ``/send`` is never reported; 2.1 reports
+``completed`` for textured meshes only.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ class _Job:
 
 @dataclass
 class FakeHunyuan3d:
-    """A Hunyuan3D server on this machine: a sent job is there after ``polls`` looks at its status.
+    """A Hunyuan3D server on this machine; a job completes after ``polls`` status requests.
 
-    ``enable_tex`` is the flag of 2.0's server; without it a texture fails.
+    ``enable_tex`` is the flag of the 2.0 server; without it, texture requests fail.
     """
 
     faults: Faults = field(default_factory=Faults)
@@ -58,15 +58,15 @@ class FakeHunyuan3d:
 
     @property
     def sent(self) -> int:
-        """The number of jobs that ``/send`` or ``/generate`` took."""
+        """Number of jobs accepted by ``/send`` or ``/generate``."""
         return len(self._jobs)
 
     def answer(self, request: Request, base_url: str) -> Response:
-        """Answer a request as api_server.py does."""
+        """Answer a request like api_server.py."""
         return with_outages(self.faults, REFUSALS, lambda: self._api(request))
 
     def _api(self, request: Request) -> Response:
-        with self._lock:  # a job blocks the server's only event loop, so requests come one after the other
+        with self._lock:  # a job blocks the server's only event loop, so requests are serialized
             if request.method == "POST" and request.path in ("/generate", "/send"):
                 return self._take(request)
             if request.method == "GET" and request.path.startswith("/status/"):
@@ -95,7 +95,9 @@ class FakeHunyuan3d:
         return Response(200, mesh_file("glb", self.faults, number), {"Content-Type": "application/octet-stream"})
 
     def _crashes(self, body: dict[str, Any]) -> bool:
-        if picture_base64(body.get("image")):  # also where there is a text only: the pipeline for it is not loaded
+        if picture_base64(
+            body.get("image")
+        ):  # also for a text-only request: the server does not load the text pipeline
             return True
         return self.version == "2.0" and bool(body.get("texture")) and not self.enable_tex
 

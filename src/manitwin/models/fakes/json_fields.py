@@ -1,4 +1,4 @@
-"""Checks of the fields of a JSON request: each says what is wrong with a value, or nothing."""
+"""Validators of fields in a JSON request; each returns an error message, or None for a valid value."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Check = Callable[[Any], str | None]
 
 
 def one_of(*valid: Any) -> Check:
-    """Accept one of some values."""
+    """Accept one of the given values."""
     return lambda value: None if value in valid else f"must be one of {', '.join(map(str, valid))}"
 
 
 def list_of(*valid: Any) -> Check:
-    """Accept a list of some values."""
+    """Accept a non-empty list of the given values."""
     return lambda value: (
         None
         if isinstance(value, list) and value and all(part in valid for part in value)
@@ -28,7 +28,7 @@ def list_of(*valid: Any) -> Check:
 
 
 def whole(low: int, high: int) -> Check:
-    """Accept an integer in a range, its ends included."""
+    """Accept an integer within a closed range."""
 
     def check(value: Any) -> str | None:
         is_whole = isinstance(value, int) and not isinstance(value, bool)
@@ -38,7 +38,7 @@ def whole(low: int, high: int) -> Check:
 
 
 def number(low: float, high: float) -> Check:
-    """Accept a number in a range, its ends included."""
+    """Accept a number within a closed range."""
 
     def check(value: Any) -> str | None:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -53,7 +53,7 @@ def flag(value: Any) -> str | None:
 
 
 def text(longest: int) -> Check:
-    """Accept a string that is not empty."""
+    """Accept a non-empty string of at most ``longest`` characters."""
 
     def check(value: Any) -> str | None:
         return None if isinstance(value, str) and 0 < len(value) <= longest else f"must be 1 to {longest} characters"
@@ -62,7 +62,7 @@ def text(longest: int) -> Check:
 
 
 def picture_url(value: Any) -> str | None:
-    """Accept an https address, or a data URI that holds a PNG or JPEG."""
+    """Accept an https URL, or a data URI of a PNG or JPEG."""
     if isinstance(value, str) and value.startswith("https://"):
         return None
     head, _, data = value.partition(",") if isinstance(value, str) else ("", "", "")
@@ -72,7 +72,7 @@ def picture_url(value: Any) -> str | None:
 
 
 def picture_base64(value: Any) -> str | None:
-    """Accept the base64 of a picture, without a data URI's head."""
+    """Accept the base64 of a picture without the prefix of a data URI."""
     try:
         Image.open(io.BytesIO(base64.b64decode(value, validate=True))).load()
     except (binascii.Error, TypeError, ValueError, UnidentifiedImageError, OSError):
@@ -81,7 +81,7 @@ def picture_base64(value: Any) -> str | None:
 
 
 def complaint(body: Any, fields: Mapping[str, Check], required: tuple[str, ...]) -> tuple[str, str] | None:
-    """Return the first field that is wrong and what is wrong with it, None where the body follows the contract."""
+    """Return the first invalid field and its error message; None if the body is valid."""
     if not isinstance(body, dict):
         return "body", "must be a JSON object"
     for name in required:

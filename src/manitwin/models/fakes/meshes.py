@@ -1,4 +1,4 @@
-"""The meshes of the fake generators: a textured bottle in the vendors' file formats, whole or with one of their faults.
+"""Meshes of the fake generators: a textured bottle in the vendors' file formats, intact or with a fault.
 
 The files are written by trimesh and by the USD library, not by this package's own writer.
 """
@@ -28,8 +28,8 @@ from manitwin.models.fakes.faults import Faults
 SEGMENTS = 64
 TEXTURE_PX = 256
 ROUGHNESS = 0.55
-ZIP_TIME_S = 946_684_800  # 2000-01-01: the same bottle gives the same package
-# radius and height of a bottle one unit high, from the middle of its base to the middle of its neck's top
+ZIP_TIME_S = 946_684_800  # 2000-01-01, for byte-reproducible packages
+# Radius and height of a bottle of height 1, from the centre of its base to the centre of the neck's top.
 BODY = ((0.0, 0.0), (0.15, 0.0), (0.165, 0.012), (0.17, 0.03), (0.17, 0.55), (0.16, 0.61), (0.12, 0.68), (0.075, 0.73))
 NECK = ((0.06, 0.76), (0.06, 0.88), (0.0, 0.88))
 CAP = ((0.0, 0.881), (0.07, 0.881), (0.07, 0.99), (0.062, 1.0), (0.0, 1.0))
@@ -39,9 +39,9 @@ Format = Literal["glb", "usdz"]
 
 @dataclass(frozen=True)
 class TexturedMesh:
-    """A closed surface of revolution about +Y: ``uv`` has its origin at the lower left, ``texture`` is RGB uint8.
+    """A closed surface of revolution about +Y. ``uv`` has its origin at the lower left; ``texture`` is RGB uint8.
 
-    Texture coordinates repeat the first meridian, so its vertices are there twice: closed once equal points are welded.
+    The vertices of the first meridian are duplicated at the texture seam; the mesh is closed once equal points are merged.
     """
 
     name: str
@@ -52,12 +52,12 @@ class TexturedMesh:
 
 
 def bottle(seed: int = 0) -> TexturedMesh:
-    """Return a capped bottle, 1 high and 0.34 wide, standing on y = 0, of about 5,000 faces; the seed gives its colour."""
+    """Return a capped bottle, 1 high and 0.34 wide, standing on y = 0, with about 5,000 faces; the seed gives its colour."""
     return revolution("bottle", (*BODY, *NECK[:2], (0.07, 0.881), *CAP[2:]), rings=28, seed=seed)
 
 
 def body_and_cap(seed: int = 0) -> list[TexturedMesh]:
-    """Return the same bottle as two closed surfaces, the cap 1/1000 above the neck."""
+    """Return the same bottle as two closed surfaces, with the cap 1/1000 above the neck."""
     return [
         revolution("body", (*BODY, *NECK), rings=30, seed=seed),
         revolution("cap", CAP, rings=8, seed=seed + 7),
@@ -65,13 +65,13 @@ def body_and_cap(seed: int = 0) -> list[TexturedMesh]:
 
 
 def revolution(name: str, profile: tuple[tuple[float, float], ...], *, rings: int, seed: int) -> TexturedMesh:
-    """Turn a profile of (radius, height), whose ends lie on the axis, into a surface of revolution."""
+    """Return the surface of revolution of a profile of (radius, height) whose ends lie on the axis."""
     points = np.asarray(profile)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     inner = np.unique(np.concatenate([np.linspace(0, along[-1], rings + 2)[1:-1], along[1:-1]]))
     radius, height = (np.interp(inner, along, points[:, column]) for column in (0, 1))
     angle = np.linspace(0.0, 2 * np.pi, SEGMENTS + 1)
-    angle[-1] = 0.0  # the last meridian is the first one, to the last bit
+    angle[-1] = 0.0  # the last meridian equals the first one exactly
     ring = np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], axis=1)
     side = radius[:, None, None] * ring + np.stack([0 * height, height, 0 * height], axis=1)[:, None]
     across = np.tile(np.linspace(0, 1, SEGMENTS + 1), (len(inner), 1))
@@ -82,7 +82,7 @@ def revolution(name: str, profile: tuple[tuple[float, float], ...], *, rings: in
 
 
 def mesh_file(format: Format, faults: Faults, seed: int = 0) -> bytes:
-    """Return the file of a finished job: a bottle, or what the first fault of meshes that strikes makes of it."""
+    """Return the file of a finished job: a bottle, modified by the first pending mesh fault."""
     whole = usdz if format == "usdz" else glb
     for fault, made in FAULTY.items():
         if faults.strike(fault):
@@ -93,7 +93,7 @@ def mesh_file(format: Format, faults: Faults, seed: int = 0) -> bytes:
 def glb(
     surfaces: list[TexturedMesh], *, texture_format: Literal["PNG", "JPEG"] = "JPEG", up: Literal["y", "z"] = "y"
 ) -> bytes:
-    """Return a binary glTF 2.0 of surfaces; ``up`` 'z' stands them along Z, which glTF does not allow."""
+    """Return a binary glTF 2.0 of surfaces; ``up`` 'z' makes it Z-up, which violates glTF."""
     scene = trimesh.Scene()
     for surface in surfaces:
         vertices = surface.vertices if up == "y" else surface.vertices[:, [2, 0, 1]]
@@ -112,7 +112,7 @@ def glb(
 
 
 def usdz(surfaces: list[TexturedMesh]) -> bytes:
-    """Return a USDZ package of surfaces, one mesh each, with UsdPreviewSurface materials; Y-up, 1 unit = 1 m."""
+    """Return a USDZ package with one mesh per surface and UsdPreviewSurface materials; Y-up, 1 unit = 1 m."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         stage = Usd.Stage.CreateNew(str(folder / "model.usdc"))
@@ -137,13 +137,13 @@ def truncated(data: bytes) -> bytes:
 
 
 def draco_glb(seed: int = 0) -> bytes:
-    """Return a GLB whose geometry is only there compressed, as KHR_draco_mesh_compression says it, and cut off."""
+    """Return a GLB whose geometry exists only as truncated KHR_draco_mesh_compression data."""
 
     def compress(tree: dict[str, Any], binary: bytes) -> tuple[dict[str, Any], bytes]:
         for accessor in tree["accessors"]:
             accessor.pop("bufferView", None)
             accessor.pop("byteOffset", None)
-        data = b"DRACO\x02\x02\x01\x01\x00\x00" + bytes(53)  # a header of Draco 2.2, and nothing that it promises
+        data = b"DRACO\x02\x02\x01\x01\x00\x00" + bytes(53)  # a valid Draco 2.2 header without valid data
         tree["bufferViews"] = [{"buffer": 0, "byteOffset": 0, "byteLength": len(data)}]
         tree["buffers"] = [{"byteLength": len(data)}]
         for name in ("images", "textures", "materials", "samplers"):
@@ -159,7 +159,7 @@ def draco_glb(seed: int = 0) -> bytes:
 
 
 def webp_glb(seed: int = 0) -> bytes:
-    """Return a GLB whose only texture is WebP, as EXT_texture_webp says it."""
+    """Return a GLB whose only texture is WebP by EXT_texture_webp."""
 
     def exchange(tree: dict[str, Any], binary: bytes) -> tuple[dict[str, Any], bytes]:
         (image,), (texture,) = tree["images"], tree["textures"]
@@ -179,7 +179,7 @@ def webp_glb(seed: int = 0) -> bytes:
 
 
 def open_surface(seed: int = 0) -> TexturedMesh:
-    """Return scraps of the bottle, one face in twenty-five: they enclose nothing, and nothing closes them to a bottle."""
+    """Return 200 random faces of the bottle, one in twenty-five: an open surface that cannot be repaired to a bottle."""
     whole = bottle(seed)
     rng = np.random.default_rng(seed)
     chosen = rng.choice(len(whole.faces), 200, replace=False)
@@ -193,7 +193,7 @@ def _either(format: Format, surfaces: list[TexturedMesh]) -> bytes:
     return usdz(surfaces) if format == "usdz" else glb(surfaces)
 
 
-# by the names of faults.FAULTS; those of GLB alone make a GLB whatever was asked for
+# Keys are names in faults.FAULTS. GLB-specific faults give a GLB whatever format was requested.
 FAULTY: dict[str, Callable[[Format, int], bytes]] = {
     "empty_mesh": lambda format, seed: b"",
     "truncated_mesh": lambda format, seed: truncated(_either(format, [bottle(seed)])),
@@ -206,7 +206,7 @@ FAULTY: dict[str, Callable[[Format, int], bytes]] = {
 
 
 def _faces(rings: int) -> np.ndarray:
-    """Return outward wound triangles of ``rings`` rings of SEGMENTS + 1 vertices and the two poles after them."""
+    """Return outward-facing triangles of ``rings`` rings of SEGMENTS + 1 vertices and of the two poles after them."""
     row = SEGMENTS + 1
     ring, segment = np.meshgrid(np.arange(rings - 1), np.arange(SEGMENTS), indexing="ij")
     low = (ring * row + segment).reshape(-1)
@@ -222,7 +222,7 @@ def _faces(rings: int) -> np.ndarray:
 
 
 def _texture(seed: int) -> np.ndarray:
-    """Return stripes ``(TEXTURE_PX, TEXTURE_PX, 3) uint8``: a label around the middle, a band at the top."""
+    """Return a striped texture ``(TEXTURE_PX, TEXTURE_PX, 3) uint8``: a label around the middle, a band at the top."""
     hue = (0.58 + 0.13 * seed) % 1.0
     plain, label = (np.array(colorsys.hsv_to_rgb(hue, s, v)) * 255 for s, v in ((0.75, 0.7), (0.1, 0.95)))
     image = np.tile(plain, (TEXTURE_PX, TEXTURE_PX, 1))
@@ -261,7 +261,7 @@ def _define_mesh(stage: Usd.Stage, surface: TexturedMesh) -> None:
 
 
 def _edited(data: bytes, change: Callable[[dict[str, Any], bytes], tuple[dict[str, Any], bytes]]) -> bytes:
-    """Return a GLB with its JSON and its binary chunk changed."""
+    """Return a GLB with modified JSON and binary chunks."""
     length = struct.unpack_from("<I", data, 12)[0]
     tree, binary = change(json.loads(data[20 : 20 + length]), data[28 + length :])
     text = json.dumps(tree).encode()

@@ -1,8 +1,8 @@
-"""A server that keeps Meshy's contract: image-to-3d, text-to-3d in two steps, balance.
+"""Fake server of the Meshy API: image-to-3d, text-to-3d in two steps, balance.
 
 Fields, states and error bodies: https://docs.meshy.ai/api/text-to-3d, .../api/image-to-3d, .../api/errors and .../api/balance,
-read 2026-11. Not documented, and chosen here: that an unknown field is refused (400), the words of the error messages, and the
-credits that an image costs. Links of files end as those of a CDN do: 403 once they have expired.
+read 2026-11. Undocumented, and assumed here: the refusal of unknown fields (400), the texts of the error messages, and the
+credits that an image costs. Expired file links give 403, like those of a CDN.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class _Task:
 
 
 class FakeMeshy(FakeVendor):
-    """Meshy on this machine: a task is done after ``polls`` looks at it and costs ``credits`` of ``balance``."""
+    """Meshy on this machine; a task completes after ``polls`` status requests and costs ``CREDITS`` of ``balance``."""
 
     refusals = REFUSALS
 
@@ -91,15 +91,15 @@ class FakeMeshy(FakeVendor):
         return f"FakeMeshy({len(self._tasks)} tasks)"
 
     def submitted(self, type: str) -> int:
-        """Return how many tasks of a type were taken, and so charged."""
+        """Return the number of accepted, and so charged, tasks of a type."""
         return sum(task.type == type for task in self._tasks.values())
 
     def seed_of(self, job: str) -> int | None:
-        """Return the seed of a task's mesh; None where there is no such task."""
+        """Return the seed of a task's mesh; None for an unknown task."""
         return self._tasks[job].seed if job in self._tasks else None
 
     def api(self, request: Request, base_url: str) -> Response:
-        """Answer a request that has the right key."""
+        """Answer an authorized request."""
         where = (request.method, request.path)
         if where == ("GET", BALANCE):
             return Response(200, {"balance": self.balance})

@@ -1,7 +1,7 @@
-"""A local server of messages over ZeroMQ in a thread, as those of grasp models are: msgpack with numpy arrays.
+"""Local ZeroMQ message server in a thread, like those of grasp models: msgpack with numpy arrays.
 
-The servers that it stands for use a REP socket, which has to answer before it can hear again. This one is a ROUTER, which
-speaks the same on the wire and can leave a question unanswered.
+The original servers use a REP socket, which must answer each request before it receives the next. This server uses a ROUTER
+socket, which is compatible on the wire and can leave a request unanswered.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from manitwin.engine.charges import REHEARSAL_MARK
 from manitwin.errors import UsageError
 from manitwin.models.fakes.faults import Faults
 
-NO_MESSAGE = b"\xc1 is no message"  # 0xc1 is the one byte that msgpack never uses
+NO_MESSAGE = b"\xc1 is no message"  # 0xc1 is the only byte that msgpack never uses
 LISTEN_MS = 50
 
 
 class MessageService(Protocol):
-    """A service behind a server of messages."""
+    """A service behind a message server."""
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Answer a request; what is raised becomes the service's own error."""
+        """Answer a request; exceptions are turned into the service's own error."""
         ...
 
     def error(self, error: Exception) -> dict[str, Any]:
-        """Return the service's own error for what was raised."""
+        """Return the service's own error message for an exception."""
         ...
 
 
 class MessageServer:
-    """Serve on this machine while the context lasts; ``requests`` keeps what was asked, in order.
+    """Serve on this machine within the context; ``requests`` records the requests in order.
 
-    Knows the faults ``hangs``, ``disconnects``, ``not_json``, ``cut_answer`` and ``server_error``, each on ``infer...`` only:
-    health and metadata are answered.
+    Faults: ``hangs``, ``disconnects``, ``not_json``, ``cut_answer`` and ``server_error``, applied to ``infer...`` actions only;
+    health and metadata are always answered.
     """
 
     def __init__(self, service: MessageService, faults: Faults | None = None, port: int = 0):
-        """Listen on ``port``, 0 for any that is free; raises UsageError where it is taken."""
+        """Listen on ``port`` (0: any free port); raises UsageError if it is in use."""
         self.requests = list[dict[str, Any]]()
         self._service, self._faults = service, faults or Faults()
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
@@ -88,24 +88,24 @@ class MessageServer:
         self._socket.close()
 
     def _reconnect(self) -> None:
-        """Drop all connections and listen again, as a server that was restarted."""
+        """Drop all connections and listen again, like a restarted server."""
         self._socket.close()
         while not self._stopped.is_set():
             try:
                 self._socket = self._listen(self.url)
                 return
-            except zmq.ZMQError:  # the port is free a moment after it was closed
+            except zmq.ZMQError:  # a closed port is freed with a delay
                 self._stopped.wait(LISTEN_MS / 1000)
 
     def _reply(self, body: bytes) -> bytes | None:
-        """Return the answer's bytes; None: say nothing, empty: cut the connection."""
+        """Return the bytes of the answer; None to stay silent, empty to cut the connection."""
         try:
             request = msgpack.unpackb(body, raw=False, object_hook=_without_pickles)
             self.requests.append(request)
             if str(request.get("action")).startswith("infer"):
                 return self._with_faults(request)
             answer = self._service.answer(request)
-        except Exception as error:  # as the servers that it stands for: whatever fails is said in the answer
+        except Exception as error:  # like the original servers, which report every exception in the answer
             answer = self._service.error(error)
         return _packed(answer)
 

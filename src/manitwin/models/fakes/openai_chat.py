@@ -1,7 +1,7 @@
-"""A fake of OpenAI's chat completions API, also as others serve it.
+"""Fake of OpenAI's chat completions API, including the variants of compatible servers.
 
 Contract: https://platform.openai.com/docs/api-reference/chat/create, fields as of the ``openai`` package 3.52 (2026); error codes
-as in https://platform.openai.com/docs/guides/error-codes. Unverified: the words of the errors for unknown fields and pictures.
+as in https://platform.openai.com/docs/guides/error-codes. Unverified: the error messages for unknown fields and invalid pictures.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ _DETAILS = ("auto", "low", "high", "original")
 
 
 class FakeOpenAi:
-    """Chat completions at ``/v1``, and embeddings.
+    """Chat completions and embeddings at ``/v1``.
 
-    ``models`` are those that are there (any, without it); ``formats`` are the kinds of ``response_format`` that it takes;
-    ``reasoning`` refuses what models that reason refuse: ``max_tokens``, and any temperature but 1. ``retry_after`` is the
-    header of a fault ``rate_limited``.
+    ``models`` lists the available models (default: any); ``formats`` are the supported kinds of ``response_format``;
+    ``reasoning`` refuses what reasoning models refuse: ``max_tokens``, and any temperature but 1. ``retry_after`` is the header
+    value of the fault ``rate_limited``; ``hang_s`` is the duration of the fault ``hangs``.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""A server that keeps the contract of OpenAI's images endpoint (https://platform.openai.com/docs/api-reference/images/create)."""
+"""Fake of OpenAI's images endpoint (https://platform.openai.com/docs/api-reference/images/create)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manitwin.models.fakes.vendor import FILES, with_outages
 
 PLACE = "/images/generations"
 BLOCKED = "forbidden"
-"""A prompt with this word is refused, as a safety system does."""
+"""A prompt with this word is refused, to simulate a safety system."""
 REFUSALS = {
     "unauthorized": (401, {"error": {"message": "Incorrect API key provided", "type": "invalid_request_error"}}),
     "rate_limited": (429, {"error": {"message": "Rate limit reached", "type": "requests"}}),
@@ -20,14 +20,14 @@ REFUSALS = {
 
 
 class FakeOpenAiImages:
-    """Answers with a picture at once, as ``b64_json`` or ``by_url``; ``drawn`` are the prompts that were paid for."""
+    """Answers immediately with a picture, as ``b64_json`` or, if ``by_url``, as a link; ``drawn`` lists the charged prompts."""
 
     def __init__(self, faults: Faults | None = None, key: str = "rehearsal-key", *, by_url: bool = False):
         self.faults, self.key, self.by_url = faults or Faults(), key, by_url
         self.drawn: list[str] = []
 
     def answer(self, request: Request, base_url: str) -> Response:
-        """Answer a request as the endpoint does."""
+        """Answer a request like the endpoint."""
         if request.path.startswith(FILES):
             return Response(200, picture_png(int(request.path.removeprefix(FILES))), {"Content-Type": "image/png"})
         if request.headers.get("authorization") != f"Bearer {self.key}":

@@ -1,4 +1,4 @@
-"""The proportions of a thing from the outlines in its pictures: as much as a rehearsal needs of an eye."""
+"""Estimation of an object's proportions from its silhouettes in several views, for rehearsal answers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 HALF_VIEW = 0.88 * float(np.tan(np.deg2rad(15.0)))
-"""Tangent of half the angle that a centred thing fills along the longer side: pictures of 30 degrees, filled to 88 %."""
+"""Tangent of the half angle that a centred object fills along the longer image side: field of view 30 degrees, filled to 88 %."""
 
 WIDTHS = np.geomspace(0.05, 1.0, 14)
 HEIGHTS = np.geomspace(0.05, 20.0, 26)
@@ -18,16 +18,16 @@ _LEAST_CONTRAST = 8  # of 255, against the colour of the corner
 
 
 def foreground(picture: np.ndarray) -> np.ndarray:
-    """Return where ``(H, W, 3) uint8`` differs from its corner, ``(H, W) bool``, specks left out."""
+    """Return the mask ``(H, W) bool`` of pixels of ``(H, W, 3) uint8`` that differ from the corner pixel, without specks."""
     differs = np.abs(picture.astype(int) - picture[0, 0].astype(int)).max(2) > _LEAST_CONTRAST
     return cv2.morphologyEx(differs.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)).astype(bool)
 
 
 def measure_proportions(pngs: list[bytes], views: list[tuple[float, float]]) -> tuple[float, float, float]:
-    """Return the sides of a box around the thing, the longest as 1, falling; ``views`` are azimuth and elevation in degrees.
+    """Return the sides of the object's bounding box in descending order, with the longest as 1.
 
-    The box, upright cylinder or ellipsoid is taken whose outlines are as wide by their height as those seen, from a grid of
-    widths, heights and turns. Without pictures: a cube.
+    ``views`` are azimuth and elevation in degrees. The result is the box, upright cylinder or ellipsoid, out of a grid of widths,
+    heights and yaws, whose silhouettes match the observed aspect ratios best. Without pictures, a cube is returned.
     """
     aspects, directions, frames = [], [], []
     for png, view in zip(pngs, views, strict=False):
@@ -45,7 +45,7 @@ def measure_proportions(pngs: list[bytes], views: list[tuple[float, float]]) -> 
 
 
 def _solids() -> list[np.ndarray]:
-    """Return surface points of a box, an upright cylinder and a ball, each of sides 1 about the origin."""
+    """Return surface points of a box, an upright cylinder and a ball, each with sides 1 and centred at the origin."""
     box = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     turn = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     circle = 0.5 * np.stack([np.cos(turn), np.sin(turn)], 1)
@@ -73,9 +73,9 @@ def _fit(
 
 
 def _outline_aspect(points: np.ndarray, azimuth_deg: float, elevation_deg: float, frame: np.ndarray) -> np.ndarray:
-    """Return width by height of the outlines of ``(K, N, 3)`` points, seen centred and filling a picture.
+    """Return the aspect ratios (width / height) of silhouettes of points ``(K, N, 3)``, centred and framed in a picture.
 
-    ``frame (2,)`` are the tangents of half the angles that are filled, across and up.
+    ``frame (2,)`` are the tangents of the filled half angles, horizontal and vertical.
     """
     azimuth, elevation = np.deg2rad(azimuth_deg), np.deg2rad(elevation_deg)
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])

@@ -1,4 +1,4 @@
-"""The pictures that fake text-to-image services draw: a coloured disc on a light ground."""
+"""Pictures of the fake text-to-image services: a coloured disc on a light background."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _GROUND = 235
 
 
 def picture_png(seed: int, *, blank: bool = False) -> bytes:
-    """Return a PNG, another for each seed; ``blank``: of one colour, as some services answer to what they refuse."""
+    """Return a PNG that depends on the seed; ``blank`` gives a single colour, as some services return for refused prompts."""
     rng = np.random.default_rng(seed)
     pixels = np.full((SIDE_PX, SIDE_PX, 3), 0 if blank else _GROUND, np.uint8)
     if not blank:

@@ -1,7 +1,7 @@
-"""A server, and a program, that keep the contract of estimators of poses (``models/pose_estimators/protocol.py``).
+"""Fake pose estimator, as a server and a program, for the contract of ``models/pose_estimators/protocol.py``.
 
-Their poses are poor on purpose: the model's middle where the masked depths are in the mean, in rotations of a cube turned by one
-that no thing is likely to have. Whoever asks has to look which of them explain the picture.
+Its poses are deliberately coarse: the model's centre is placed at the mean of the masked depth points, with the rotations of a
+cube composed with an arbitrary rotation. The client has to check which poses explain the picture.
 
     python -m manitwin.models.fakes.pose_estimator REQUEST OUT
 """
@@ -59,7 +59,7 @@ def _answer(request: Request) -> Response:
 
 
 def guesses(document: dict[str, Any], content: dict[str, bytes]) -> dict[str, Any]:
-    """Return an answer to a question; raises ValueError or KeyError for one that does not keep the protocol."""
+    """Return the answer to a request; raises ValueError or KeyError for a request that violates the protocol."""
     if (
         document["protocol"] != PROTOCOL
         or set(document["files"]) != set(FILES)
@@ -83,7 +83,7 @@ def guesses(document: dict[str, Any], content: dict[str, bytes]) -> dict[str, An
     mesh = trimesh.load_mesh(trimesh.util.wrap_as_stream(content[named["mesh"]]), file_type="ply")
     vertices = np.asarray(mesh.vertices)
     middle = (vertices.min(0) + vertices.max(0)) / 2
-    seen += seen / np.linalg.norm(seen) * document["diameter_m"] / 4  # what is seen is the near side
+    seen += seen / np.linalg.norm(seen) * document["diameter_m"] / 4  # the visible points lie on the near side
     turn = Rotation.from_rotvec([0.2, 0.5, 0.3])
     poses = []
     for rotation in (turn * Rotation.create_group("O")).as_matrix():
@@ -101,7 +101,7 @@ def _numbers(png: bytes) -> np.ndarray:
 
 
 def main(request: Path, out: Path) -> None:
-    """Answer the question in a folder."""
+    """Answer the request in a folder."""
     document = json.loads((request / "request.json").read_text())
     content = {path.name: path.read_bytes() for path in request.iterdir() if path.name != "request.json"}
     out.write_text(json.dumps(guesses(document, content)))

@@ -1,8 +1,8 @@
-"""A stand-in for the Rodin API by Hyper3D.
+"""Fake of the Rodin API by Hyper3D.
 
-Contract: developer.hyper3d.ai, api-specification/* (Gen-1 & 1.5, Gen-2, Gen-2.5, check-status, download-results,
-check-balance), pages as stored in November 2026 at the latest, and the vendor's own client DeemosTech/rodin3d-skills.
-Unverified: the HTTP status of refusals other than 401 (400 here), and the answer about a task that is not known (404 here).
+Contract: developer.hyper3d.ai, api-specification/* (Gen-1 & 1.5, Gen-2, Gen-2.5, check-status, download-results, check-balance),
+pages as stored in November 2026 at the latest, and the vendor's own client DeemosTech/rodin3d-skills. Unverified: the HTTP status
+of refusals other than 401 (400 here), and the answer for an unknown task (404 here).
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ REFUSALS = {
 
 @dataclass
 class RodinTask:
-    """A task: its form and how often it has been polled."""
+    """A task: its form, images and number of polls."""
 
     form: dict[str, str]
     images: list[bytes]
@@ -63,9 +63,9 @@ class RodinTask:
 
 
 class FakeRodin(FakeVendor):
-    """Answer as Rodin does; ``tasks`` are those that were taken, in order, each worth half a credit.
+    """Rodin on this machine; ``tasks`` are the accepted tasks in order, each charged half a credit.
 
-    A task is Waiting at the first poll, Generating until ``polls`` of them, then Done. Its base URL is ``.url + "/api/v2"``.
+    A task is Waiting at the first poll, Generating until the ``polls``-th, then Done. The base URL is ``.url + "/api/v2"``.
     """
 
     refusals = REFUSALS
@@ -79,11 +79,11 @@ class FakeRodin(FakeVendor):
         self._links = 0
 
     def seed_of(self, job: str) -> int | None:
-        """Return the seed of a task's mesh; None where there is no such task."""
+        """Return the seed of a task's mesh; None for an unknown task."""
         return int(self.tasks[job].form.get("seed", "0")) if job in self.tasks else None
 
     def api(self, request: Request, base_url: str) -> Response:
-        """Answer a request that has the right key."""
+        """Answer an authorized request."""
         if (request.method, request.path) == ("GET", f"{PREFIX}/check_balance"):
             return Response(200, {"balance": self.credits})
         if request.method != "POST":
@@ -157,7 +157,7 @@ def _error(status: int, code: str, message: str) -> Response:
 
 
 def _wrong(form: dict[str, str], images: list[bytes]) -> str | None:
-    """Return what is wrong with a form, None where nothing is."""
+    """Return the error message for a form; None if it is valid."""
     for name, value in form.items():
         if name not in (*ENUMS, *RANGES, *FREE_TEXT):
             return f"unknown field {name}"

@@ -1,4 +1,4 @@
-"""A local HTTP server in a thread, around something that answers requests; a header of each answer says it is a rehearsal."""
+"""Local HTTP server in a thread for a fake service; a response header marks every answer as a rehearsal."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from manitwin.engine.charges import REHEARSAL_MARK
 
 MAX_BODY_BYTES = 256 << 20
 LONGEST_WAIT_S = 0.05
-"""For a request, before it is looked whether the server is to end."""
+"""Interval in seconds at which the server checks whether to stop."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """A request as it came: header names in lower case."""
+    """A received request; header names are in lower case."""
 
     method: str
     path: str
@@ -51,7 +51,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Response:
-    """An answer; a dictionary or list is sent as JSON. ``cut_after``: the connection ends after so many bytes of the body."""
+    """An answer; a dictionary or list is sent as JSON. ``cut_after`` closes the connection after that many bytes of the body."""
 
     status: int = 200
     body: bytes | dict[str, Any] | list[Any] = b""
@@ -69,12 +69,12 @@ class FakeService(Protocol):
     """A service behind a fake server."""
 
     def answer(self, request: Request, base_url: str) -> Response:
-        """Answer a request; ``base_url`` is where this server is reached."""
+        """Answer a request; ``base_url`` is the address of this server."""
         ...
 
 
 class FakeServer:
-    """Serve a service on this machine while the context lasts; ``requests`` keeps what was asked, in order."""
+    """Serve a service on this machine within the context; ``requests`` records the requests in order."""
 
     def __init__(self, service: FakeService, port: int = 0):
         self.service, self.requests = service, list[Request]()
@@ -87,7 +87,7 @@ class FakeServer:
         return self
 
     def __exit__(self, *exc: object) -> None:
-        with suppress(OSError):  # a socket that is shut ends the wait for the next request: it is not waited out
+        with suppress(OSError):  # shutting the socket down ends the wait for the next request at once
             self._server.socket.shutdown(socket.SHUT_RDWR)
         self._server.shutdown()
         self._server.server_close()
@@ -98,7 +98,7 @@ class _Server(ThreadingHTTPServer):
     fake: FakeServer
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Print nothing about clients that went away before their answer."""
+        """Ignore errors of clients that disconnected early."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
@@ -139,4 +139,4 @@ class _Handler(BaseHTTPRequestHandler):
     do_GET = do_POST = do_PUT = do_DELETE = do_HEAD = _do
 
     def log_message(self, format: str, *args: object) -> None:
-        """Print nothing: requests are kept in ``requests``."""
+        """Print nothing; requests are recorded in ``requests``."""

@@ -1,8 +1,8 @@
-"""A stand-in for the Tripo API v2.
+"""Fake of the Tripo API v2.
 
-Contract: docs.tripo3d.ai (errors, task, generation and upload pages) and VAST-AI-Research/tripo-python-sdk be675df, as
-stored in November 2026 at the latest: error codes with their HTTP statuses, fields, states, links of five minutes.
-Unverified: which of the bad fields get code 1004 (all here).
+Contract: docs.tripo3d.ai (errors, task, generation and upload pages) and VAST-AI-Research/tripo-python-sdk be675df, as stored in
+November 2026 at the latest: error codes with their HTTP statuses, fields, states, links valid for five minutes. Unverified: which
+invalid fields give code 1004 (all here).
 """
 
 from __future__ import annotations
@@ -45,17 +45,16 @@ REFUSALS = {
 
 @dataclass
 class TripoTask:
-    """A task: what was asked and how often it has been polled."""
+    """A task: its input and number of polls."""
 
     input: dict[str, Any]
     polls: int = 0
 
 
 class FakeTripo(FakeVendor):
-    """Answer as Tripo does; ``tasks`` are those that were taken, in order, each worth thirty credits.
+    """Tripo on this machine; ``tasks`` are the accepted tasks in order, each charged thirty credits.
 
-    A task is queued at the first poll, running until ``polls`` of them, then success. Its base URL is
-    ``.url + "/v2/openapi"``.
+    A task is queued at the first poll, running until the ``polls``-th, then success. The base URL is ``.url + "/v2/openapi"``.
     """
 
     refusals = REFUSALS
@@ -68,11 +67,11 @@ class FakeTripo(FakeVendor):
         self._links = 0
 
     def seed_of(self, job: str) -> int | None:
-        """Return the seed of a task's mesh; None where there is no such task."""
+        """Return the seed of a task's mesh; None for an unknown task."""
         return self.tasks[job].input.get("model_seed", 0) if job in self.tasks else None
 
     def api(self, request: Request, base_url: str) -> Response:
-        """Answer a request that has the right key."""
+        """Answer an authorized request."""
         path = request.path.removeprefix(PREFIX)
         if (request.method, path) == ("GET", "/user/balance"):
             return _data({"balance": self.credits, "frozen": 0})

@@ -1,4 +1,4 @@
-"""The frame of the fake vendors: faults of any web service, a key, and files behind signed links."""
+"""Base of the fake vendors: common web service faults, a key, and files behind signed links."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ REFUSED = ("unauthorized", "out_of_credit", "rate_limited", "server_error")
 
 
 def with_outages(faults: Faults, refusals: Mapping[str, tuple[int, Any]], answer: Callable[[], Response]) -> Response:
-    """Answer, or fail as ``faults`` say; ``refusals`` are the status and body of each of REFUSED that the service has.
+    """Return the answer, or fail according to ``faults``; ``refusals`` has the service's status and body for faults in REFUSED.
 
-    A refused request does nothing. A hanging one, one that is cut and one whose answer makes no sense have been carried
-    out: whoever asked does not learn of it.
+    A refused request has no effect. Requests that hang, are cut off or get a malformed answer have been carried out, but the
+    client does not learn of it.
     """
     for fault in REFUSED:
         if fault in refusals and faults.strike(fault):
@@ -43,10 +43,10 @@ def with_outages(faults: Faults, refusals: Mapping[str, tuple[int, Any]], answer
 
 
 class FakeVendor(ABC):
-    """A vendor of generated meshes on this machine: an API with a key, and finished files behind links without one.
+    """Base class of a mesh generation vendor on this machine: an API with a key, and finished files behind links without a key.
 
-    ``refusals`` are the vendor's words for the faults of any web service; ``polls`` is how often a job is looked at before it
-    is done.
+    ``refusals`` are the vendor's answers for common web service faults; ``polls`` is the number of status requests until a job is
+    done.
     """
 
     refusals: ClassVar[Mapping[str, tuple[int, Any]]]
@@ -56,11 +56,11 @@ class FakeVendor(ABC):
         self._lock = threading.Lock()
 
     def authorization(self) -> str:
-        """Return the header that holds the key."""
+        """Return the authorization header with the key."""
         return f"Bearer {self.key}"
 
     def answer(self, request: Request, base_url: str) -> Response:
-        """Answer a request as the vendor does, one at a time."""
+        """Answer a request like the vendor; requests are serialized."""
         if request.path.startswith(FILES):
             return self._file(request)
         if request.headers.get("authorization") != self.authorization():
@@ -69,20 +69,20 @@ class FakeVendor(ABC):
 
     @abstractmethod
     def api(self, request: Request, base_url: str) -> Response:
-        """Answer a request that has the right key."""
+        """Answer an authorized request."""
 
     @abstractmethod
     def seed_of(self, job: str) -> int | None:
-        """Return the seed of a job's mesh; None where there is no such job."""
+        """Return the seed of a job's mesh; None for an unknown job."""
 
     def _locked(self, request: Request, base_url: str) -> Response:
         with self._lock:
             return self.api(request, base_url)
 
     def _file(self, request: Request) -> Response:
-        """Serve ``/files/JOB/NAME``, as an object store does behind a signed link.
+        """Serve ``/files/JOB/NAME`` like an object store behind a signed link.
 
-        A key that is sent along is an error: Amazon S3 answers 400 to a signed link with an Authorization header.
+        A request with a key is an error: Amazon S3 answers 400 to a signed link with an Authorization header.
         """
         job, _, name = request.path.removeprefix(FILES).partition("/")
         seed = self.seed_of(job)

@@ -1,7 +1,7 @@
-"""Answers that a vision-language model could give to the annotator's questions, made by rules: to rehearse with.
+"""Rule-based answers to the annotator's questions in place of a vision-language model, for rehearsals.
 
-What it is called is read in the question, what such things have in the table of priors, proportions and colors in the
-pictures; of the numbers it chooses those that the question itself says most about. Equal questions get equal answers.
+The object's name is parsed from the question, its properties come from the priors, its proportions and colours from the pictures.
+Marked points are chosen by the values that the question lists for them. Equal questions get equal answers.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from manitwin.models.annotators.priors import unknown_prior
 from manitwin.models.fakes.picture_proportions import foreground, measure_proportions
 
 ASKED_AGAIN = "It contradicts what is known"
-"""What the annotator says where an answer is asked for once more."""
+"""The annotator's phrase in a repeated question."""
 
 _NAME = re.compile(r"(?:The user calls it|it was recognised as): (.+?)\.(?:\s|$)")
 _VIEW = re.compile(r"azimuth (-?\d+), elevation (-?\d+)")
@@ -30,12 +30,17 @@ _BOX = re.compile(r"as it stands, has 1 : ([\d.]+) : ([\d.]+)")
 _DENSITY = re.compile(r"is ([\d.e+-]+) kg/m3, but a thing of .* has ([\d.e+-]+) to ([\d.e+-]+) kg/m3")
 _ASKED_FOR = re.compile(r"somebody asks for (['\"])(.+?)\1\.(?:\s|$)")
 _TOO_WIDE = re.compile(r"marker (\d+), .*fingers")
-_ONE_MATTER = ("food skin", "foam", "wax", "wood")  # surfaces of things that are full of one matter, not of contents
+_ONE_MATTER = (
+    "food skin",
+    "foam",
+    "wax",
+    "wood",
+)  # surfaces of solid homogeneous objects, rather than of containers with contents
 _USUAL_WALL_M = 0.003
 
 
 def rehearsal_answer(schema_name: str, schema: dict[str, Any], text: str, pngs: list[bytes]) -> dict[str, Any]:
-    """Answer a question by its schema's name, its whole text and its pictures; any other schema gets a value of its form."""
+    """Answer a question, given its schema's name, its whole text and pictures; unknown schemas get a minimal valid value."""
     found = _NAME.search(text)
     prior = lookup(found.group(1)) if found else None
     if schema_name == "quality":
@@ -102,7 +107,7 @@ def _physical(prior: Prior, named: bool, text: str, pngs: list[bytes], matters: 
 
 
 def _corrected(answer: dict[str, Any], prior: Prior, findings: str) -> dict[str, Any]:
-    """Return the answer as one gives it who takes the findings for right: proportions as measured, mass as matter has it."""
+    """Return the answer corrected by the findings: measured proportions, and a mass consistent with the material's density."""
     if box := _BOX.search(findings):
         for side, share in (("width_m", float(box.group(1))), ("height_m", float(box.group(2)))):
             answer[side] = {key: float(f"{value * share:.4g}") for key, value in answer["length_m"].items()}
@@ -115,7 +120,7 @@ def _corrected(answer: dict[str, Any], prior: Prior, findings: str) -> dict[str,
 
 
 def _matters(prior: Prior, known: list[str]) -> list[str]:
-    """Return the material of the surface and those that the prior names, at most four."""
+    """Return the surface material and those named by the prior, at most four."""
     first = prior.surface if prior.surface in known else "other"
     named = [matter for matter in known if re.search(rf"\b{matter}\b", prior.material)]
     return list(dict.fromkeys([first, *named]))[:4]
@@ -172,7 +177,7 @@ def _points(schema_name: str, schema: dict[str, Any], text: str, prior: Prior) -
 
 
 def _functional(listed: dict[str, tuple[int, int]], prior: Prior) -> list[dict[str, Any]]:
-    """Return the highest and the lowest place."""
+    """Return the highest and the lowest candidate as functional points."""
     order = sorted(listed, key=lambda number: (listed[number][0], int(number)))
     places = ((order[-1], "upper end", "what one reaches first"), (order[0], "underside", "what it rests on"))
     return [
@@ -188,7 +193,7 @@ def _functional(listed: dict[str, tuple[int, int]], prior: Prior) -> list[dict[s
 
 
 def _grasps(listed: dict[str, tuple[int, int]], prior: Prior, text: str) -> list[dict[str, Any]]:
-    """Return the place nearest to the center of gravity, and the nearest at another height."""
+    """Return the candidate nearest to the centre of gravity, and the nearest one at a different height."""
     order = sorted(listed, key=lambda number: (*listed[number], int(number)))
     heights = [height for _, height in listed.values()]
     apart = 0.2 * (max(heights) - min(heights))
@@ -212,7 +217,7 @@ def _grasps(listed: dict[str, tuple[int, int]], prior: Prior, text: str) -> list
 
 
 def _template(schema: dict[str, Any], name: str | None, text: str) -> dict[str, Any]:
-    """Return the template of what the thing is called, or of the last words of a text that call it something; else none."""
+    """Return the template that matches the object's name or the last matching words of a request; the last category otherwise."""
     categories = schema["properties"]["category"]["enum"]
     asked = _ASKED_FOR.search(text)
     words = (asked.group(2) if asked else name or "").lower().split()
@@ -223,7 +228,7 @@ def _template(schema: dict[str, Any], name: str | None, text: str) -> dict[str, 
 
 
 def _unchanged(schema_name: str, schema: dict[str, Any]) -> dict[str, Any]:
-    """Return that a template's usual measures and looks are right."""
+    """Return an answer that confirms a template's usual measures and appearance."""
     first = schema_name == "template_measures"
     measures = dict.fromkeys(schema["properties"]["measures" if first else "corrected"]["properties"])
     if first:
@@ -232,7 +237,7 @@ def _unchanged(schema_name: str, schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _color(pngs: list[bytes]) -> str:
-    """Return a plain word for the median color of what the first picture shows."""
+    """Return a basic colour word for the median foreground colour of the first picture."""
     if not pngs:
         return "grey"
     picture = np.asarray(Image.open(io.BytesIO(pngs[0])).convert("RGB"))
@@ -249,7 +254,7 @@ def _color(pngs: list[bytes]) -> str:
 
 
 def _of_form(schema: dict[str, Any]) -> Any:
-    """Return the plainest value that a schema allows."""
+    """Return a minimal value that satisfies a schema."""
     if "enum" in schema:
         return schema["enum"][0]
     if "anyOf" in schema:
