@@ -1,1 +1,1 @@
-"""Pages in the browser: the gallery of a data set and a page of each twin, from a server of this machine or as plain files."""
+"""Browser pages of data sets, twins, scenes and episodes, from a local server or as static files, and the review pages."""

@@ -1,13 +1,15 @@
-"""Who may ask the server for anything: the address it is called by, the page that asks, and a cookie in place of a link.
+"""Access control of the page server: host and origin checks, one-time links, and session cookies.
 
-A server on 127.0.0.1 can be reached by every page that is open in the same browser. Three things are asked of each request,
-of HTTP and of a WebSocket alike, before any of it reaches the pages:
+A server on 127.0.0.1 can be reached by every page that is open in the same browser. Each request, HTTP and WebSocket alike, must
+pass three checks before it reaches the application:
 
-1. ``Host`` is a name of this server, so that no other name that leads here (DNS rebinding) is answered;
-2. ``Origin``, where there is one, is the server's own; a WebSocket, and whatever changes something, must have one;
-3. the cookie holds a secret that was given for a link of one use.
+1. ``Host`` is a name of this server, which prevents DNS rebinding.
 
-Nothing here is written to a log.
+2. ``Origin``, if present, is the server's own; WebSockets and state-changing requests must have one.
+
+3. The cookie holds a secret that was issued for a one-time link.
+
+Nothing here is logged.
 """
 
 from __future__ import annotations
@@ -23,9 +25,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from manitwin.web.tokens import Tokens
 
 ENTER = "/enter"
-"""The path of a link: ``/enter?token=...&next=/...``."""
+"""Path of a one-time link: ``/enter?token=...&next=/...``."""
 PERSON = "manitwin.person"
-"""The key of the ASGI scope that says who asks."""
+"""Key of the ASGI scope with the authenticated person."""
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
 _READING = frozenset({"GET", "HEAD"})
 
@@ -34,7 +36,7 @@ CONTENT_SECURITY_POLICY = "; ".join(
         "default-src 'none'",
         "script-src 'self'",
         "style-src 'self'",
-        "img-src 'self' blob: data:",  # blob: a GLB's textures
+        "img-src 'self' blob: data:",  # blob: textures of a GLB
         "connect-src 'self' blob:",
         "form-action 'self'",
         "base-uri 'none'",
@@ -45,18 +47,19 @@ HEADERS = {
     "content-security-policy": CONTENT_SECURITY_POLICY,
     "x-content-type-options": "nosniff",
     "x-frame-options": "DENY",
-    "referrer-policy": "same-origin",  # no-referrer would make the Origin of a form's POST null
+    "referrer-policy": "same-origin",  # with no-referrer, the Origin of a form's POST would be null
     "cross-origin-opener-policy": "same-origin",
     "cross-origin-resource-policy": "same-origin",
 }
-"""Of every answer. Scripts and styles come from files of this server alone; no inline text is run, whatever a caption holds."""
+"""Headers of every answer. Scripts and styles are only loaded from files of this server; inline code in a caption never runs."""
 
 
 @dataclass(frozen=True)
 class Names:
-    """The names by which a server is called: those of its own machine, and the host that was asked for.
+    """Names under which a server may be addressed: those of the local machine, and the requested host.
 
-    ``open``: it listens beyond this machine. It then answers to any address in digits as well, which no DNS can turn elsewhere.
+    ``open`` means that the server listens beyond this machine. It then also answers to any numeric IP address, which DNS
+    rebinding cannot forge.
     """
 
     hosts: frozenset[str]
@@ -75,7 +78,7 @@ class Names:
         return cls(frozenset({*LOOPBACK_NAMES, written.lower()}), port, open=not local)
 
     def known(self, host: str) -> bool:
-        """Tell whether the content of a ``Host`` header is one of them."""
+        """Return whether a ``Host`` header is one of these names with the server's port."""
         try:
             parts = urlsplit(f"//{host}")
             name, port = parts.hostname or "", parts.port or 80
@@ -87,7 +90,7 @@ class Names:
         return written in self.hosts or (self.open and _is_address(name))
 
     def own_origin(self, origin: str, host: str) -> bool:
-        """Tell whether an ``Origin`` is that of the pages that this server gave under the name it is called by."""
+        """Return whether an ``Origin`` is that of this server's pages under the requested host name."""
         return origin.lower() == f"http://{host.lower()}"
 
 
@@ -100,15 +103,17 @@ def _is_address(name: str) -> bool:
 
 
 class Guard:
-    """ASGI middleware around an application: refuses what ``access`` says, and adds ``HEADERS`` to every answer."""
+    """ASGI middleware that refuses requests as described in this module and adds ``HEADERS`` to every answer."""
 
     def __init__(self, app: ASGIApp, names: Names, tokens: Tokens, used_link: Callable[[], None] | None = None):
         self.app, self.names, self.tokens = app, names, tokens
-        self.cookie = f"manitwin_{names.port}"  # cookies know no ports: one server must not end another's
+        self.cookie = (
+            f"manitwin_{names.port}"  # cookies ignore ports: servers on one host must not overwrite each other's cookie
+        )
         self._used_link = used_link
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer, or hand on."""
+        """Refuse a request, answer it, or pass it on."""
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
             return
@@ -145,7 +150,9 @@ class Guard:
     async def _enter(self, scope: Scope, send: Send) -> None:
         asked = parse_qs(scope["query_string"].decode("latin-1"))
         token, onward = asked.get("token", [""])[0], asked.get("next", ["/"])[0]
-        secret = self.tokens.redeem(token) if scope["method"] == "GET" else None  # a look ahead (HEAD) uses no link up
+        secret = (
+            self.tokens.redeem(token) if scope["method"] == "GET" else None
+        )  # HEAD, as sent by link previews, does not use the link up
         if secret is None:
             if self._used_link is not None:
                 self._used_link()

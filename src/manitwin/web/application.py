@@ -1,4 +1,4 @@
-"""The server's pages: gallery, twin, and the files that they name. They read; nothing here writes or changes anything."""
+"""Read-only server pages: gallery, twin pages, and the files that they refer to."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from manitwin.web.twin_page import twin_page
 
 LINKS = ServerLinks()
 _KEPT = {"cache-control": "private, max-age=86400"}
-"""Of files whose address has the revision in it."""
+"""Cache headers of files whose URL contains the revision."""
 NOT_KEPT = {"cache-control": "no-store"}
 
 
 def application(
     gallery: Gallery | None, twins: TwinFolders, title: str, trials: TrialPlayer | None = None
 ) -> Starlette:
-    """Return the pages of a data set, or of one twin (``gallery`` None), without the guard that belongs before them.
+    """Return the pages of a data set, or of one twin (``gallery`` None), without the access guard.
 
-    ``trials`` plays grasp trials, and is the caller's to close.
+    ``trials`` plays grasp trials; the caller closes it.
     """
     player = TrialPlayer() if trials is None else trials
 
@@ -90,11 +90,13 @@ async def _give_package_file(request: Request) -> Response:
 
 
 PACKAGE_FILES = Route("/static/{name}", _give_package_file)
-"""The styles and scripts of all pages."""
+"""Styles and scripts of all pages."""
 
 
 async def answered(work: Callable[[], Response]) -> Response:
-    """Answer from a thread; what a person can mend is said in words, and a broken twin ends nothing but its own page."""
+    """Run ``work`` in a thread and return its response. Errors are shown as a message page, so that a broken twin affects only
+    its page.
+    """
     try:
         return await run_in_threadpool(work)
     except UsageError as error:
@@ -109,7 +111,7 @@ def _gallery(gallery: Gallery, asked: dict[str, str], title: str) -> Response:
         view = View.of(asked)
         return HTMLResponse(gallery_page(gallery.find(view), title, LINKS), headers=NOT_KEPT)
     except UsageError as error:
-        # a condition that cannot be used: all twins, what is wrong, and the fields as they were
+        # For an invalid condition, show all twins, the error, and the fields as entered.
         status = asked.get("status", "accepted")
         shown = gallery.find(View(status=status if status in ("accepted", "rejected") else "accepted"))
         page = gallery_page(shown, title, LINKS, error=str(error), asked=view)
@@ -121,7 +123,7 @@ def _twin(twins: TwinFolders, twin_id: str, with_gallery: bool) -> Response:
 
 
 class _FileResponse(StreamingResponse):
-    """Streams a file, and closes it also where whoever asked has gone before its end."""
+    """Streams a file, and closes it even if the client disconnects early."""
 
     def __init__(self, file: ServedFile):
         headers = {"content-type": file.content_type, "content-length": str(file.size_bytes), **_KEPT}
@@ -136,6 +138,6 @@ class _FileResponse(StreamingResponse):
 
 
 def message(status: int, said: str) -> Response:
-    """Return a page that says one thing."""
+    """Return a page with a single message."""
     body = f'<main class="message"><p role="alert">{text(said)}</p><p><a href="{LINKS.gallery()}">The first page</a></p></main>\n'
     return HTMLResponse(page(str(status), body, LINKS), status, headers=NOT_KEPT)

@@ -1,4 +1,4 @@
-"""The table of all attempts of a run, a page of it at a time: those that were not recorded too, with the reason."""
+"""Paged table of all attempts of a run, including unrecorded ones with the reason."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _OTHER = len(OUTCOMES)
 
 @dataclass(frozen=True)
 class AttemptRow:
-    """An attempt as a list shows it; ``number`` is that of its recording, None where it was not kept."""
+    """An attempt as shown in a list; ``number`` is that of its recording, None if it was not kept."""
 
     number: int | None
     episode_id: str
@@ -36,9 +36,10 @@ class AttemptRow:
 
 
 class AttemptRows:
-    """The rows of an ``attempts.parquet``; raises EpisodesError where it is none, or its outcomes are none.
+    """The rows of an ``attempts.parquet``; raises EpisodesError if the file or its outcomes are invalid.
 
-    ``outcomes`` counts them. The outcomes of all rows are held, a byte each; a page reads the row groups that it lies in.
+    ``outcomes`` counts the attempts per outcome. The outcomes of all rows are kept in memory, one byte each; a page reads only
+    the row groups that it needs.
     """
 
     def __init__(self, path: Path):
@@ -58,11 +59,11 @@ class AttemptRows:
         self.kept = self.outcomes.get("kept", 0)
 
     def count(self, outcome: str = "") -> int:
-        """Return the number of attempts of an outcome, or of all."""
+        """Return the number of attempts with an outcome, or of all."""
         return self.outcomes.get(outcome, 0) if outcome else len(self._codes)
 
     def page(self, start: int, count: int, outcome: str = "") -> list[AttemptRow]:
-        """Return so many attempts of an outcome, or of all, from one on."""
+        """Return ``count`` attempts with an outcome, or of all, beginning with the ``start``-th."""
         places = np.flatnonzero(self._codes == OUTCOMES.index(outcome)) if outcome else np.arange(len(self._codes))
         chosen = places[start : start + count]
         groups = np.searchsorted(self._starts, chosen, side="right") - 1

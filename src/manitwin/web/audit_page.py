@@ -1,4 +1,4 @@
-"""The audit of many assets as one HTML page: what was found by rule, what could not be read, and the worst in pictures."""
+"""HTML report of an audit of assets: findings by rule, unreadable assets, and pictures of the worst ones."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from manitwin.assets.audit.report import count_by_severity, summary, unread_by_c
 from manitwin.dataset.report_page import Picture, Section, Table, page
 
 MOST_SHOWN = 24
-"""Assets that are shown with a picture and all their findings."""
+"""Maximum number of assets shown with a picture and all their findings."""
 
 _SEVERITIES = ("error", "warning", "note")
 _SHOWN_AS = "Left what is seen, in its plain colours; right what collides, each shape in a colour of its own."
 
 
 def shown_assets(audited: Sequence[Audited]) -> list[Audited]:
-    """Return the assets that the page shows with a picture: the worst, at most ``MOST_SHOWN``."""
+    """Return the assets shown with a picture: the worst ones, at most ``MOST_SHOWN``."""
     return worst_assets(audited)[:MOST_SHOWN]
 
 
 def audit_page(audited: Sequence[Audited], rules: Sequence[RuleText], pictures: Mapping[str, bytes]) -> bytes:
-    """Return the page, which needs no request; the same findings and pictures give the same bytes.
+    """Return the self-contained page; equal findings and pictures give equal bytes.
 
-    ``pictures`` are PNGs by asset, of those of ``shown_assets`` that can be drawn.
+    ``pictures`` maps assets to PNGs, for those of ``shown_assets`` that can be drawn.
     """
     lead = [
         summary(audited),

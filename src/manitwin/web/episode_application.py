@@ -1,4 +1,4 @@
-"""The server's pages of recorded episodes: the list, each one in 3D, and the pages and files of the twins in them."""
+"""Server pages of recorded episodes: the list, a 3D view of each, and the pages and files of their twins."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from manitwin.web.twin_document import document_bytes
 
 
 def episode_application(pages: ASGIApp, episodes: EpisodeFolders, title: str) -> Starlette:
-    """Return the pages of episodes, and ``pages`` of the twins behind them, without the guard that belongs before all."""
+    """Return the pages of episodes, falling back to ``pages`` of their twins, without the access guard."""
 
     async def show_list(request: Request) -> Response:
         asked = request.query_params
@@ -55,7 +55,7 @@ def episode_application(pages: ASGIApp, episodes: EpisodeFolders, title: str) ->
 
 
 def no_twins(why: str) -> ASGIApp:
-    """Return what stands for the pages of twins where there are none: the scripts and styles, and a line that says why."""
+    """Return a substitute for the twin pages if the twins are not available: scripts, styles, and a message with the reason."""
 
     async def tell(request: Request) -> Response:
         return message(404, why)
@@ -98,7 +98,7 @@ def _list(episodes: EpisodeFolders, start: str, outcome: str, title: str) -> Res
 def _row(said: dict[str, Any] | str, number: int) -> AttemptRow | str:
     try:
         return said if isinstance(said, str) else recorded_row(said, number)
-    except EpisodesError as error:  # a broken episode ends nothing but its own line
+    except EpisodesError as error:  # a broken episode affects only its own line
         return str(error)
 
 

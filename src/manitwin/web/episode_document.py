@@ -1,4 +1,4 @@
-"""What the 3D view plays of a recorded episode, as one JSON document: where links and objects are, state by state."""
+"""JSON document of a recorded episode for the 3D view: poses of links and objects over time."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from manitwin.web.served_files import MODEL
 
 DOCUMENT = "episode_view.json"
 MOST_STATES = 1_500
-"""Of a document: 75 s of every state that is recorded; of a longer episode every second one, and so on."""
+"""Maximum number of states of a document: 75 s at the recorded rate; longer episodes are subsampled."""
 MOST_NUMBERS = 600_000
-"""Of all poses together: 4 MB of JSON."""
+"""Maximum number of values of all poses together: 4 MB of JSON."""
 MOST_OBJECTS, MOST_GRANULES = 200, 300
 _DECIMALS = 4
-"""A tenth of a millimetre; of a quaternion a hundredth of a degree."""
+"""A tenth of a millimetre; for quaternions a hundredth of a degree."""
 _LONGEST_QUATERNION = 0.01
-"""How far from 1 the length of a recorded one may be."""
+"""Tolerance of the norm of a recorded quaternion."""
 _LENGTH_OF_POSE = 7
 
 
 def episode_document(episode: StoredEpisode, number: int, folders: EpisodeFolders, links: Links) -> dict[str, Any]:
-    """Return the document: metres, world frame, quaternions wxyz, seconds; ``unreadable`` has a line for what cannot be shown.
+    """Return the document: metres, world frame, quaternions wxyz, seconds. ``unreadable`` lists what cannot be shown.
 
-    ``robots`` has the robot, or each of two arms. Poses are rows of position and quaternion, one for each of ``time_s``, or one
-    in all where it never changes. Forces are the largest between two rows. Raises EpisodesError for rotations that are none,
-    and for more than can be shown.
+    ``robots`` has the robot, or each of two arms. Poses are rows of position and quaternion, one per entry of ``time_s``, or a
+    single row if constant. Forces are maxima since the previous row. Raises EpisodesError for invalid rotations and for episodes
+    that exceed the limits.
     """
     recording, unreadable = episode.recording, list[str]()
     if len(episode.objects) > MOST_OBJECTS:
@@ -84,9 +84,9 @@ def episode_document(episode: StoredEpisode, number: int, folders: EpisodeFolder
 
 
 def shown_states(recording: Recording, things: int) -> np.ndarray:
-    """Return the numbers of the states that a document has: all, or every n-th and the last, as its limits allow.
+    """Return the indices of the states in a document: all, or every n-th and the last, within its limits.
 
-    ``things`` are so many poses a state. Raises EpisodesError where the limits leave no two of them.
+    ``things`` is the number of poses per state.
     """
     count = recording.steps + 1
     granules = (
@@ -101,7 +101,7 @@ def shown_states(recording: Recording, things: int) -> np.ndarray:
 def _objects(
     episode: StoredEpisode, folders: EpisodeFolders, links: Links, unreadable: list[str]
 ) -> tuple[list[dict[str, Any]], Callable[[str], str]]:
-    """Return what is told of each object but its poses, and what gives an object's words for its name."""
+    """Return the description of each object without its poses, and a function from object names to display names."""
     known: dict[str, tuple[str, str]] = {}
     twins = folders.twins
     for twin_id in sorted({each.twin_id for each in episode.objects}):
@@ -133,7 +133,7 @@ def _objects(
 def _arms(
     robot: Robot, shown: list[list[str]], recording: Recording, states: np.ndarray, links: Links
 ) -> list[dict[str, Any]]:
-    """Return the links of the robot, or of each of its two arms, whose numbers stand side by side in the arrays."""
+    """Return the links of the robot, or of each of its two arms, whose values are adjacent columns of the arrays."""
     arms = robot.arms or (robot,)
     ends = np.cumsum([len(arm.arm_joints) for arm in arms])[:-1]
     joints = np.split(recording.joint_positions_rad[states], ends, axis=1)
@@ -161,7 +161,7 @@ def _object_poses(recording: Recording, states: np.ndarray) -> list[list[float]]
 
 
 def _poses(positions_m: np.ndarray, quaternions_wxyz: np.ndarray) -> list[float]:
-    """Return rows ``(S, 7)`` in one list; one row where all are equal as they are written."""
+    """Return pose rows ``(S, 7)`` as one flat list; a single row if all are equal after rounding."""
     lengths = np.linalg.norm(quaternions_wxyz.astype(float), axis=1)
     if not (np.abs(lengths - 1) < _LONGEST_QUATERNION).all():
         raise EpisodesError("a recorded rotation is none: its quaternion is not of length 1; write the episodes again")
@@ -205,7 +205,7 @@ def _room(episode: StoredEpisode, unreadable: list[str]) -> dict[str, Any]:
 
 
 def _goal(episode: StoredEpisode) -> list[float] | None:
-    """Return the pose that the target was to reach, of episodes without a goal in words."""
+    """Return the goal pose of the target for episodes without a goal expression; None otherwise."""
     said = episode.facts.get("goal_object_to_world")
     if episode.attempt.goal is not None or said is None:
         return None
@@ -223,7 +223,7 @@ def _goal(episode: StoredEpisode) -> list[float] | None:
 
 
 def _hands(episode: StoredEpisode, states: np.ndarray) -> list[dict[str, Any]]:
-    """Return the opening of jaws, m, of each arm; else the one joint of a hand, or the mean of its joints, rad, by name."""
+    """Return the jaw opening (m) of each arm; for other hands the only joint, or the mean of the joints (rad), by name."""
     names, values = episode.robot.hand_state, episode.recording.hand[states]
     called = [f"{arm.name}: opening" for arm in episode.robot.arms] or ["opening"]
     if episode.robot.has_jaws and len(called) == values.shape[1]:
@@ -235,12 +235,12 @@ def _hands(episode: StoredEpisode, states: np.ndarray) -> list[dict[str, Any]]:
 
 
 def _sides(episode: StoredEpisode) -> list[str]:
-    """Return what each of the forces is."""
+    """Return the label of each force curve."""
     words = ("force on the object, N", "from the other side")
     return [f"{arm.name}: {each}" for arm in episode.robot.arms for each in words] or list(words)
 
 
 def _largest(values: np.ndarray, states: np.ndarray) -> np.ndarray:
-    """Return the largest of ``(T + 1, F)`` since the state before, for each of the states."""
+    """Return, for each of the given states, the maximum of ``values (T + 1, F)`` since the previous one."""
     starts = np.append(0, states[:-1] + 1)
     return np.asarray(np.maximum.reduceat(values, starts, axis=0))

@@ -1,4 +1,4 @@
-"""What happens in a recorded episode, and when: phases, literals that are worked on, grasps, falls of granules, contacts."""
+"""Events of a recorded episode on its timeline: phases, goal literals, grasps, falling granules, contacts."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from manitwin.errors import EpisodesError, UsageError
 from manitwin.formats.printable import printable_line
 
 HELD_N = 0.5
-"""That both sides press with where a thing is held: what counts as a contact in the recording too (``unplanned_contact``)."""
+"""Minimum force of both fingers on a held object; also the contact threshold of the recording (``unplanned_contact``)."""
 SHORT = 3
-"""States: what is interrupted for so few goes on, and what lasts for fewer is left out."""
+"""Number of states: shorter interruptions are bridged, and shorter spans are dropped."""
 MOST_EVENTS = 200
 
 _SHOWN = {
@@ -31,12 +31,12 @@ _SHOWN = {
     "speed_m_s": (1.0, "m/s"),
     "rise_m": (1e3, "mm of rise"),
 }
-"""Measured values of events that are told: by what they are multiplied, and the words after them."""
+"""Measured values of events that are displayed: factor and unit."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """A state of things from one recorded state to the last one in which it lasts, both counted."""
+    """An interval of recorded states, both ends included, with a label."""
 
     first: int
     last: int
@@ -45,7 +45,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Happening:
-    """Something that happened at a time of the recording, s."""
+    """An event at a time of the recording in seconds."""
 
     time_s: float
     kind: str
@@ -68,7 +68,7 @@ class _Events(BaseModel):
 
 
 def phases(recording: Recording) -> list[Span]:
-    """Return the phases in their order; the state after the last action belongs to the last one."""
+    """Return the phases in order; the state after the last action belongs to the last phase."""
     known = {int(each): each.name.lower() for each in Phase}
     return [
         Span(first, last, known.get(value, f"phase {value}"))
@@ -77,7 +77,7 @@ def phases(recording: Recording) -> list[Span]:
 
 
 def literals(episode: StoredEpisode) -> list[Span]:
-    """Return the literals of the goal as they are worked on; none without a goal in words."""
+    """Return the intervals in which each literal of the goal is pursued; empty without a goal expression."""
     said = goal_literals(episode.attempt.goal)
     recording = episode.recording
     if not said:
@@ -91,7 +91,7 @@ def literals(episode: StoredEpisode) -> list[Span]:
 
 
 def goal_literals(goal: str | None) -> list[str]:
-    """Return the literals of a goal that are to come true, the whole of it where it cannot be read; none without one."""
+    """Return the literals of a goal expression, the whole text if it cannot be parsed, or nothing without a goal."""
     found = [str(each) for each in _parsed(goal)]
     return found or ([printable_line(goal, max_characters=400)] if goal else [])
 
@@ -106,9 +106,9 @@ def _parsed(goal: str | None) -> tuple[Literal, ...]:
 
 
 def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happening]:
-    """Return what happened in the order of time; ``called`` gives the words for the name of an object.
+    """Return the events in order of time; ``called`` maps object names to display names.
 
-    Raises EpisodesError where the facts tell of events that are none.
+    Raises EpisodesError if the recorded events are invalid.
     """
     recording, moved = episode.recording, [called(episode.objects[number].name) for number in handled_objects(episode)]
     rate, last = float(RATE_HZ), recording.steps
@@ -129,7 +129,7 @@ def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Hap
     found += _granules(episode, called) + _told(episode, called)
     found += [
         Happening(span.first / rate, "literal", f"now: {span.label}") for span in literals(episode)[1:]
-    ]  # the first one begins with the episode
+    ]  # the first literal begins with the episode
     return sorted(found, key=lambda each: each.time_s)[:MOST_EVENTS]
 
 
@@ -151,7 +151,7 @@ def _granules(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happ
 
 
 def _told(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happening]:
-    """Return the events that were latched as the episode ran; those without a time stand at its end."""
+    """Return the events recorded during the episode; those without a time are placed at its end."""
     try:
         events = _Events.model_validate(episode.facts).events
     except ValidationError as error:
@@ -174,14 +174,14 @@ def _told(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happenin
 
 
 def _runs(values: np.ndarray) -> list[tuple[int, int, int]]:
-    """Return the first and last place and the value of each run of equal values."""
+    """Return the first index, last index and value of each run of equal values."""
     starts = np.flatnonzero(np.diff(values.astype(int), prepend=-1))
     ends = [*(starts[1:] - 1), len(values) - 1]
     return [(int(start), int(end), int(values[start])) for start, end in zip(starts, ends, strict=True)]
 
 
 def _spans(true: np.ndarray) -> list[tuple[int, int]]:
-    """Return where flags are true, first and last place; gaps shorter than ``SHORT`` are closed."""
+    """Return the intervals in which a flag is true, as first and last index; gaps up to ``SHORT`` are closed."""
     found: list[tuple[int, int]] = []
     for start, end, value in _runs(true):
         if not value:
@@ -194,10 +194,10 @@ def _spans(true: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _lasting(true: np.ndarray) -> list[tuple[int, int]]:
-    """Return those of the spans that are not short: a thing that tips for an instant has not been lifted."""
+    """Return the intervals that are not short: an object that tips for an instant has not been lifted."""
     return [(start, end) for start, end in _spans(true) if end - start + 1 >= SHORT]
 
 
 def span_json(span: Span) -> dict[str, Any]:
-    """Return a span as plain values, s."""
+    """Return an interval as plain values in seconds."""
     return {"from_s": span.first / RATE_HZ, "to_s": span.last / RATE_HZ, "label": span.label}

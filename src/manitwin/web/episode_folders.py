@@ -1,4 +1,4 @@
-"""The recorded episodes of a run that a page may show, by their numbers, with the twins and the robot that they are of."""
+"""Numbered access to the recorded episodes of a run, with their twins and their robot."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from manitwin.web.attempt_rows import AttemptRows
 from manitwin.web.served_files import TwinFolders
 
 MOST_EPISODE_BYTES = 256 << 20
-"""Of the arrays of one episode, unpacked; one of a minute with 60 granules has 3 MB."""
+"""Limit on the unpacked arrays of one episode; a minute with 60 granules has 3 MB."""
 _SUFFIXES = (".h5", ".hdf5")
 
 
 @dataclass(frozen=True)
 class _Place:
-    """Where an episode lies; ``problem`` where its file cannot be read, which then counts as one."""
+    """Location of an episode; ``problem`` is set if its file cannot be read, which then counts as one episode."""
 
     file: Path
     number: int
@@ -41,7 +41,7 @@ class _Place:
 
 
 def is_episodes(place: str) -> bool:
-    """Tell whether a place holds recorded episodes: a run of ``manitwin trajectories``, or an HDF5 file."""
+    """Return whether a place holds recorded episodes: a run of ``manitwin trajectories``, or an HDF5 file."""
     if "://" in place:
         return False
     found = Path(place)
@@ -51,11 +51,11 @@ def is_episodes(place: str) -> bool:
 
 
 class EpisodeFolders:
-    """The episodes at a place: those of the merged file, or, while a run goes on, those of its batches.
+    """The episodes at a place: those of the merged file or, during a run, those of its batches.
 
-    ``twins`` is None where it is not known, or not there, whose twins they are: ``without_twins`` says why. ``dataset`` names the
-    data set of the twins, None: where they were as the episodes were made. ``cache`` takes those of a data set at a URL.
-    Raises UsageError where there are no attempts, EpisodesError where the one file of them cannot be read.
+    ``twins`` is None if the twins are unknown or missing, with the reason in ``without_twins``. ``dataset`` is the data set of
+    the twins; None means the one that the episodes were made from. ``cache`` stores the twins of a data set at a URL. Raises
+    UsageError if there are no attempts, and EpisodesError if their only file cannot be read.
     """
 
     def __init__(self, place: str, cache: Path, dataset: str | None = None):
@@ -73,13 +73,13 @@ class EpisodeFolders:
         return len(self._places)
 
     def said(self, number: int) -> dict[str, Any]:
-        """Return what is no array of an episode; raises UsageError where there is none of this number, EpisodesError."""
+        """Return an episode's data except arrays; raises UsageError for an unknown number, EpisodesError for a broken episode."""
         place = self._place(number)
         with EpisodeFile(place.file) as file:
             return file.said(place.number)
 
     def said_of(self, numbers: range) -> list[dict[str, Any] | str]:
-        """Return the same of episodes that are there, each file opened once; for one that cannot be read a line."""
+        """Return the same for several episodes, opening each file once; a broken episode gives its error message."""
         found: list[dict[str, Any] | str] = []
         for path, places in groupby((self._places[number] for number in numbers), key=lambda place: place.file):
             told = list(places)
@@ -93,7 +93,9 @@ class EpisodeFolders:
         return found
 
     def episode(self, number: int) -> StoredEpisode:
-        """Return an episode whose arrays fit together; raises UsageError for another number, EpisodesError for a broken one."""
+        """Return an episode with consistent arrays; raises UsageError for an unknown number, EpisodesError for a
+        broken episode.
+        """
         place = self._place(number)
         name = f"{place.file}: traj_{place.number}"
         with EpisodeFile(place.file) as file:
@@ -110,7 +112,7 @@ class EpisodeFolders:
     def robot(self, name: str) -> Robot:
         """Return a robot of the package, or the one that the run was made with.
 
-        Raises UsageError where it is neither; ConfigError and Unavailable as ``load_robot`` does.
+        Raises UsageError for any other robot, and ConfigError and Unavailable as ``load_robot`` does.
         """
         if name in (*shipped_robots(), *shipped_two_arms()):
             return load_robot(name)
@@ -124,7 +126,7 @@ class EpisodeFolders:
         )
 
     def robot_of(self, recorded: RecordedRobot) -> Robot:
-        """Return the robot of a recording; raises ConfigError where the one of its name has other joints."""
+        """Return the robot of a recording; raises ConfigError if the robot of this name now has other joints or bases."""
         robot = self.robot(recorded.name)
         now = recorded_robot(robot)
         if (now.arm_joints, now.hand_state, now.arms) != (recorded.arm_joints, recorded.hand_state, recorded.arms):
@@ -144,7 +146,7 @@ class EpisodeFolders:
         if where is None:
             self.without_twins = f"{self.root}: does not say whose twins it is of; name their data set (--twins)"
             return
-        if dataset is None and "://" in where:  # what a file says is no wish of a person's
+        if dataset is None and "://" in where:  # a URL named in a file is not fetched without the user's consent
             self.without_twins = f"{self.root}: its twins are at {where}; name it to have them fetched (--twins)"
             return
         try:
@@ -155,7 +157,7 @@ class EpisodeFolders:
             self.without_twins = str(error)
 
     def _attempts(self) -> tuple[AttemptRows | None, str]:
-        """Return the table of all attempts, if it is that of these episodes; else why not, in a line, if there is one."""
+        """Return the table of all attempts if it matches these episodes, else None with the reason, if any."""
         path = self.root / ATTEMPTS
         if not self.root.is_dir() or _merged(self.root) is None or not path.is_file():
             return None, ""
@@ -192,13 +194,13 @@ def _places(root: Path) -> list[_Place]:
     if merged is not None:
         return _of_file(_inside(merged, root))
     files = sorted((root / BATCHES).glob(f"*/*/{EPISODES}"))
-    with suppress(ManiTwinError):  # by their attempts' numbers, where those can be read
+    with suppress(ManiTwinError):  # in the order of their attempts, if that can be read
         files = [folder / EPISODES for folder in batch_folders(root)]
     places: list[_Place] = []
     for file in files:
         try:
             places += _of_file(_inside(file, root))
-        except EpisodesError as error:  # a broken batch is one line among the others
+        except EpisodesError as error:  # a broken batch is one line in the list
             places.append(_Place(file, 0, str(error)))
     return places
 
@@ -215,7 +217,7 @@ def _inside(file: Path, root: Path) -> Path:
 
 
 def _configuration(root: Path) -> dict[str, Any]:
-    """Return what the run of a folder, or of a file in its folders, was made with; nothing where it is not known."""
+    """Return the configuration of the run that a folder, or a file inside it, belongs to; empty if unknown."""
     folder = root.resolve() if root.is_dir() else root.resolve().parent
     for each in (folder, *list(folder.parents)[:3]):
         if (each / CONFIG).is_file():

@@ -1,4 +1,4 @@
-"""The pages of recorded episodes as HTML: the list of a run's attempts, and one episode in 3D with all that is known of it."""
+"""HTML pages of recorded episodes: the list of a run's attempts, and one episode with its 3D view and data."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ LAYERS = (
     ("path", "P", "Path of the tool", False),
     ("goal", "G", "Goal", True),
 )
-"""What the 3D view can show: name, key, words, and whether it does at first."""
+"""Layers of the 3D view: name, key, label, and whether initially visible."""
 SPEEDS = (("0.1", "1/10 ×"), ("0.25", "1/4 ×"), ("0.5", "1/2 ×"), ("1", "1 ×"), ("2", "2 ×"), ("4", "4 ×"))
 KEYS = (
     ("Space", "play, pause"),
@@ -55,9 +55,9 @@ KEYS = (
 
 @dataclass(frozen=True)
 class EpisodeList:
-    """A page of a list: its rows, or lines for what cannot be read, from ``place`` on of ``count`` of one outcome, or of all.
+    """A page of a list: rows, or error messages for unreadable ones, from ``place`` on, of ``count`` with one outcome or of all.
 
-    ``recorded`` are so many in all; ``outcomes`` counts all attempts, where they are known.
+    ``recorded`` is the total number of recorded episodes; ``outcomes`` counts all attempts if they are known.
     """
 
     rows: Sequence[AttemptRow | str]
@@ -90,7 +90,7 @@ def recorded_row(said: dict[str, Any], number: int) -> AttemptRow:
 
 
 def list_page(shown: EpisodeList, title: str, remark: str, links: Links) -> str:
-    """Return a page of the list; ``remark`` is a line above it."""
+    """Return a page of the list; ``remark`` is a line above the table."""
     pages = "".join(
         f'<a href="{text(links.episodes(start, shown.outcome))}"{" aria-current=page" if start == shown.place else ""}>'
         f"{start + 1:,}–{min(start + PAGE_EPISODES, shown.count):,}</a>"
@@ -147,7 +147,7 @@ def _row(row: AttemptRow | str, links: Links) -> str:
 
 
 def _plan_failures(said: str | None) -> str:
-    """Return how many grasps failed of what, in words; nothing where that cannot be read."""
+    """Return the number of failed grasps per cause as text; empty if it cannot be read."""
     try:
         counts = TypeAdapter(dict[str, int]).validate_json(said or "{}")
     except ValidationError:
@@ -166,7 +166,7 @@ def episode_page(
 ) -> str:
     """Return the page of an episode; ``before`` and ``after`` are the numbers of its neighbours. Raises EpisodesError.
 
-    ``data`` are the scripts with what a server would be asked for.
+    ``data`` are scripts with the data that a server would otherwise provide.
     """
     attempt = attempt_from(said["attempt"])
     steps = "".join(

@@ -1,4 +1,4 @@
-"""The gallery as HTML: cards of one page, the filters beside them. Its state is its address, so that a link shows the same."""
+"""HTML gallery: one page of cards beside the filters. The URL holds the whole state, so that a link reproduces the view."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _BOUNDS = (
     ("Mass, kg", "mass_min", "mass_max"),
 )
 MOST_FACETS = 1_000
-"""Categories that can be chosen from a list; others are found by words."""
+"""Maximum number of categories in the selection list; others can be searched by words."""
 
 
 def gallery_page(found: Found, title: str, links: Links, error: str = "", asked: View | None = None) -> str:
-    """Return the page of a view; the filters are those of the view that was ``asked`` for, where it had an ``error``."""
+    """Return the page of a view. After an ``error``, the filters are those of the requested view ``asked``."""
     view = found.view
     body = (
         f"{_header(found, title, links)}"
@@ -39,7 +39,7 @@ def gallery_page(found: Found, title: str, links: Links, error: str = "", asked:
 
 
 def plain_gallery_page(rows: Sequence[dict[str, Any]], status: str, title: str, said: str, links: Links) -> str:
-    """Return a gallery of given rows that needs no server: all cards, and a field that hides those without its words."""
+    """Return a static gallery of given rows: all cards, and a text field that filters them."""
     body = (
         f'<header class="top"><h1>{text(title)}</h1></header>\n<main id="main" class="plain">\n'
         '<form class="find" hidden><label>Words <input type="search" id="find"></label></form>\n'
@@ -50,7 +50,7 @@ def plain_gallery_page(rows: Sequence[dict[str, Any]], status: str, title: str, 
 
 
 def cards(rows: Sequence[dict[str, Any]], status: str, links: Links) -> str:
-    """Return the cards of rows; their pictures are loaded when they come into sight."""
+    """Return the cards of rows; their pictures are loaded lazily."""
     return '<ul class="cards">\n' + "".join(_card(row, status, links) for row in rows) + "</ul>\n"
 
 

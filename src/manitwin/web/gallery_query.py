@@ -1,4 +1,4 @@
-"""What a gallery's address asks for, and the rows of the index that answer it: DuckDB, one page at a time."""
+"""Parsing of a gallery's URL, and the index queries that answer it, one page at a time."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.web.card_tables import TABLES, WORDS, CardTables
 
 PAGE_CARDS = 48
-"""Divides by 2, 3, 4 and 6: rows of cards are full at most widths."""
+"""Divisible by 2, 3, 4 and 6, so that rows of cards are full at most widths."""
 TIMEOUT_S, MEMORY_GB = 10.0, 0.25
-"""Of a condition in SQL; a person who waits longer than that has gone."""
+"""Limits on a user's SQL condition."""
 MOST_WORDS = 12
 LONGEST_TEXT = 2_000
-"""Characters of one field of an address."""
+"""Maximum number of characters of a URL field."""
 
 SORTS = {
     "accepted": (
@@ -44,15 +44,15 @@ _BOUNDS = {
     "longest_min": ("longest_m", ">="), "longest_max": ("longest_m", "<="), "mass_min": ("mass_kg", ">="),
     "mass_max": ("mass_kg", "<="), "verified_min": ("verified", ">="), "robustness_min": ("robustness_median", ">="),
 }  # fmt: skip
-"""Fields of an address that hold a number: the column and how it is compared. Metres, kilograms, grasps, a share."""
+"""Numeric URL fields with their column and comparison; metres, kilograms, number of grasps, share."""
 
 
 @dataclass(frozen=True)
 class View:
-    """A view of the gallery, as its address says it: ``of`` reads one, ``query`` writes it.
+    """A view of the gallery as encoded in its URL: ``of`` parses, ``query`` writes it.
 
-    ``q`` are words that all have to occur; ``where`` is a condition as of ``manitwin query``; ``sort`` a column, from the largest
-    down with ``-``; ``page`` counts from 1. Bounds are None where there is none.
+    ``q`` are words that must all occur, ``where`` is a condition as in ``manitwin query``, ``sort`` a column (descending with
+    ``-``), and ``page`` counts from 1. Bounds are None if not set.
     """
 
     status: str = "accepted"
@@ -72,7 +72,7 @@ class View:
 
     @classmethod
     def of(cls, asked: Mapping[str, str]) -> View:
-        """Return the view of an address's fields; raises UsageError for one that there is not, or that cannot be meant."""
+        """Return the view of a URL's fields; raises UsageError for an unknown field or an invalid value."""
         given: dict[str, Any] = {}
         names = [each.name for each in fields(cls)]
         for name, value in asked.items():
@@ -92,7 +92,7 @@ class View:
         return view
 
     def query(self, **changes: Any) -> str:
-        """Return the address's fields of this view, or of a changed one: what is not as by default, in a fixed order."""
+        """Return the URL fields of this view, with changes: the values other than defaults, in a fixed order."""
         view = replace(self, **changes)
         said = [
             (each.name, getattr(view, each.name)) for each in fields(view) if getattr(view, each.name) != each.default
@@ -100,7 +100,7 @@ class View:
         return urlencode([(name, decimal(value) if isinstance(value, float) else value) for name, value in said])
 
     def conditions(self) -> list[str]:
-        """Return the conditions on the view's cards (``CardTables``), in SQL; ``where`` is not among them."""
+        """Return the SQL conditions on the view's cards (``CardTables``), without ``where``."""
         found = [f"contains({WORDS}, {sql_text(word.lower())})" for word in self.q.split()[:MOST_WORDS]]
         if self.status == "accepted":
             found += [f"category = {sql_text(self.category)}"] if self.category else []
@@ -112,7 +112,7 @@ class View:
 
 
 def decimal(value: float) -> str:
-    """Return a number of a view as an address and its field hold it: read again, it is the same to 15 digits."""
+    """Return a number as text for a URL or input field, exact to 15 digits."""
     return f"{value:.15g}"
 
 
@@ -128,9 +128,10 @@ def _number(name: str, value: str) -> float:
 
 @dataclass(frozen=True)
 class Found:
-    """The cards of one page, how many there are on all, and what could be asked for instead.
+    """The cards of one page, the total number, and the facets.
 
-    ``counts`` are all twins by status; ``categories``, ``stages`` and ``reasons`` how many of each there are, the most first.
+    ``counts`` is the number of twins per status; ``categories``, ``stages`` and ``reasons`` count their values, most frequent
+    first.
     """
 
     view: View
@@ -148,9 +149,9 @@ class Found:
 
 
 class Gallery:
-    """The index of a data set, asked page by page; threads wait for each other. An index that was written anew is opened anew.
+    """Paged access to the index of a data set. Thread-safe by locking. A rewritten index is reopened.
 
-    Raises UsageError where there is none.
+    Raises UsageError if there is no index.
     """
 
     def __init__(self, root: DatasetRoot):
@@ -160,7 +161,7 @@ class Gallery:
         self._opened()
 
     def find(self, view: View) -> Found:
-        """Return a page of the view; raises UsageError for a condition that cannot be used."""
+        """Return a page of the view; raises UsageError for an invalid condition."""
         with self._lock:
             cards, among = self._opened(), self._among(view)
             rows = cards.rows(
@@ -174,13 +175,15 @@ class Gallery:
             return Found(view, rows, cards.count(view.status, view.conditions(), among), **self._facets)
 
     def chosen(self, view: View) -> list[dict[str, Any]]:
-        """Return all rows of the view, with the words that are searched."""
+        """Return all rows of the view with their searched words."""
         with self._lock:
             cards, among = self._opened(), self._among(view)
             return cards.rows(view.status, view.conditions(), sort=view.sort, among=among, with_words=True)
 
     def _among(self, view: View) -> pa.Table | None:
-        """Return the twins of a condition in SQL, which the index answers: it may read all of its tables."""
+        """Return the twins that satisfy the SQL condition, evaluated by the index, whose tables it may read; None without a
+        condition.
+        """
         return self._index.select(TABLES[view.status], view.where, columns=["twin_id"]) if view.where else None
 
     def _opened(self) -> CardTables:
@@ -199,7 +202,7 @@ class Gallery:
 
     def _index_stamp(self) -> tuple[int, int]:
         if self.root.local is None:
-            return (0, 0)  # of a data set at a URL, the index of when the server began
+            return (0, 0)  # the index of a data set at a URL is not reloaded
         try:
             about = os.stat(self.root.full(PARTS))
         except OSError:

@@ -1,7 +1,7 @@
-"""Grippers as boxes that open with the grasp's width: a fork for many grasps at once, the whole hand for one.
+"""Gripper drawings from boxes that follow the grasp width: a simple fork for many grasps, the whole hand for one.
 
-A box is ``{center, half, quaternion, shift, grow}`` in the grasp frame (+Z approach, X closing), metres, quaternion wxyz; at an
-opening w its centre lies ``shift * w`` further along X, and its half extent in X is ``grow * w`` larger.
+A box is ``{center, half, quaternion, shift, grow}`` in the grasp frame (+Z approach, X closing), in metres, quaternion wxyz. At
+an opening w, its centre moves by ``shift * w`` along X, and its half extent in X grows by ``grow * w``.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grip
 _STEP_M = 0.01
 _STEM_M = 0.03
 _FINGER_M = 0.045
-"""Of a gripper that is not known here: the length of its fingers in a drawing."""
+"""Drawn finger length of an unknown gripper."""
 
 
 def gripper_shape(name: str, rod_m: float, depth_m: float) -> dict[str, Any]:
-    """Return how a gripper is drawn: ``known``, ``fork`` and ``hand``, lists of boxes.
+    """Return the drawing of a gripper: ``known``, ``fork`` and ``hand``, lists of boxes.
 
-    ``rod_m`` is the thickness of a fork's rods. Of a gripper that does not come with the package a fork is drawn whose fingers
-    end at ``depth_m``, as its grasps have it, and there is no hand.
+    ``rod_m`` is the thickness of a fork's rods. For a gripper that is not shipped with the package, the fork's fingers end at the
+    depth ``depth_m`` of its grasps, and ``hand`` is empty.
     """
     if name not in shipped_grippers():
         return {"known": False, "fork": _fork(depth_m - _FINGER_M, depth_m, rod_m), "hand": []}
@@ -42,7 +42,7 @@ def gripper_shape(name: str, rod_m: float, depth_m: float) -> dict[str, Any]:
 
 
 def _opening(gripper: Gripper) -> list[dict[str, Any]]:
-    """Return a gripper's boxes with how they move as it opens, from two openings: each is a straight line in X."""
+    """Return a gripper's boxes with their motion as it opens, computed from two openings; the motion is linear in X."""
     closed, open_ = gripper.boxes(0.0), gripper.boxes(_STEP_M)
     if len(closed) != len(open_):
         return [_box(*each) for each in closed]
@@ -53,7 +53,7 @@ def _opening(gripper: Gripper) -> list[dict[str, Any]]:
 
 
 def _fingers(boxes: list[PlacedBox]) -> tuple[float, float] | None:
-    """Return where the fingers begin and end along Z, those boxes being fingers that lie beside x = 0; None without any."""
+    """Return the start and end of the fingers along Z (boxes beside x = 0 are fingers); None if there are none."""
     front, tip, sides = 0.0, 0.0, set()
     for pose, half in boxes:
         top = float(box_corners(half, pose)[:, 2].max())
@@ -68,7 +68,7 @@ def _fork(front_m: float, tip_m: float, rod_m: float) -> list[dict[str, Any]]:
     finger = [half, half, reach]
     parts = [
         _axis_box([side * half, 0.0, tip_m - reach], finger, shift=side / 2) for side in (1, -1)
-    ]  # outside of the faces that touch
+    ]  # outside the contact faces
     bar = _axis_box([0.0, 0.0, front_m], [rod_m, half, half], grow=0.5)
     stem = _axis_box([0.0, 0.0, front_m - _STEM_M / 2], [half, half, _STEM_M / 2])
     return [*parts, bar, stem]

@@ -1,4 +1,4 @@
-"""Pieces of pages. Every text goes through ``text``: nothing that a record says is read as HTML."""
+"""HTML building blocks. Every text passes through ``text``, so that record contents are never interpreted as HTML."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ STYLE, THREE, VIEWER, GALLERY, REVIEW = "manitwin.css", "three.js", "twin_viewer
 STAGE, SCENE_VIEWER, EPISODE_VIEWER = "stage.js", "scene_viewer.js", "episode_viewer.js"
 EPISODE_TIMELINE, TWIN_SHAPES, TRIAL_PLAYER = "episode_timeline.js", "twin_shapes.js", "trial_player.js"
 OUTLINE = "outline.js"
-"""The styles and scripts of the pages, by the names under which they are served and written."""
+"""File names of styles and scripts, as served and as written."""
 
 
 def text(value: object) -> str:
-    """Return a value as HTML text, of an attribute too; what would be hidden or turn the line round is written out."""
+    """Return a value as escaped HTML text, also for attributes; invisible and bidirectional control characters are
+    made visible.
+    """
     return escape(printable(str(value)), quote=True)
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a number with so many significant digits, without an exponent where it is near to 1."""
+    """Return a number with ``digits`` significant digits, without an exponent for moderate magnitudes."""
     if value == 0 or 1e-4 <= abs(value) < 1e6:
         shown = f"{value:.{digits}g}"
         return f"{value:.0f}" if "e" in shown else shown
@@ -30,7 +32,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def page(title: str, body: str, links: Links, scripts: Sequence[str] = (), data: Sequence[str] = ()) -> str:
-    """Return a whole page; ``scripts`` are of this package, ``data`` are files beside the page that are loaded before them."""
+    """Return a whole page; ``scripts`` belong to this package, ``data`` are files beside the page that are loaded first."""
     loaded = [*data, *(links.asset(name) for name in scripts)]
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -43,7 +45,7 @@ def page(title: str, body: str, links: Links, scripts: Sequence[str] = (), data:
 
 
 def table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[Any]], note: str = "") -> str:
-    """Return a table whose first column names the row; None is an en dash. Cells are plain values, never HTML."""
+    """Return a table whose first column names the row; None is shown as an en dash. Cells are plain values, never HTML."""
     written = "".join(
         f'<tr><th scope="row">{text(row[0])}</th>' + "".join(f"<td>{cell(value)}</td>" for value in row[1:]) + "</tr>\n"
         for row in rows
@@ -60,7 +62,7 @@ def table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[Any]], not
 
 
 def cell(value: Any) -> str:
-    """Return a value as it stands in a table."""
+    """Return a value as table cell text."""
     if value is None or value == "":
         return "–"
     if isinstance(value, bool):
@@ -71,7 +73,7 @@ def cell(value: Any) -> str:
 
 
 def options(choices: Iterable[tuple[str, str]], chosen: str) -> str:
-    """Return the options of a select: values and what is shown."""
+    """Return the options of a select element from pairs of value and label."""
     return "".join(
         f'<option value="{text(value)}"{" selected" if value == chosen else ""}>{text(shown)}</option>'
         for value, shown in choices

@@ -1,4 +1,4 @@
-"""The addresses on a page: of a server, or relative ones of plain files. A page is the same in both but for these."""
+"""Links of a page: absolute paths of a server, or relative paths of static files. Pages differ only in these."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ THUMBNAIL = "views/rgb_00.webp"
 
 
 class Links(Protocol):
-    """Addresses as one page needs them."""
+    """Links that pages need."""
 
     @property
     def live(self) -> bool:
-        """Tell whether a server answers, which can search and read files when they are asked for."""
+        """Whether a server answers requests, such as searches."""
         ...
 
     def gallery(self, query: str = "") -> str:
-        """Return the gallery, with the fields of a view."""
+        """Return the gallery with the fields of a view."""
         ...
 
     def twin(self, twin_id: str) -> str:
@@ -26,11 +26,11 @@ class Links(Protocol):
         ...
 
     def file(self, twin_id: str, name: str, revision: str) -> str:
-        """Return a file of a twin; the revision keeps an older one in a cache from being shown."""
+        """Return a file of a twin; the revision prevents a stale cached file from being shown."""
         ...
 
     def scenes(self, start: int = 0) -> str:
-        """Return the list of scenes, from one on."""
+        """Return the list of scenes, beginning with the ``start``-th."""
         ...
 
     def scene(self, scene_id: str, name: str = "") -> str:
@@ -38,7 +38,7 @@ class Links(Protocol):
         ...
 
     def episodes(self, start: int = 0, outcome: str = "") -> str:
-        """Return the list of episodes, from one on, of one outcome or of all."""
+        """Return the list of episodes, beginning with the ``start``-th, with one outcome or all."""
         ...
 
     def episode(self, number: int, name: str = "") -> str:
@@ -46,7 +46,7 @@ class Links(Protocol):
         ...
 
     def robot(self, name: str, arm: int = 0) -> str:
-        """Return the looks of the links of a robot, of two arms those of one."""
+        """Return the link meshes of a robot, or of one of two arms."""
         ...
 
     def asset(self, name: str) -> str:
@@ -56,12 +56,12 @@ class Links(Protocol):
 
 @dataclass(frozen=True)
 class ServerLinks:
-    """The addresses of the server."""
+    """Links of the server."""
 
     live = True
 
     def gallery(self, query: str = "") -> str:
-        """Return the gallery, with the fields of a view."""
+        """Return the gallery with the fields of a view."""
         return f"/?{query}" if query else "/"
 
     def twin(self, twin_id: str) -> str:
@@ -69,7 +69,7 @@ class ServerLinks:
         return f"/twin/{quote(twin_id, safe='')}"
 
     def scenes(self, start: int = 0) -> str:
-        """Return the list of scenes, from one on."""
+        """Return the list of scenes, beginning with the ``start``-th."""
         return f"/?from={start}" if start else "/"
 
     def scene(self, scene_id: str, name: str = "") -> str:
@@ -77,7 +77,7 @@ class ServerLinks:
         return f"/scene/{quote(scene_id, safe='')}{name and f'/{name}'}"
 
     def episodes(self, start: int = 0, outcome: str = "") -> str:
-        """Return the list of episodes, from one on, of one outcome or of all."""
+        """Return the list of episodes, beginning with the ``start``-th, with one outcome or all."""
         asked = {**({"outcome": outcome} if outcome else {}), **({"from": start} if start else {})}
         return f"/?{urlencode(asked)}" if asked else "/"
 
@@ -86,7 +86,7 @@ class ServerLinks:
         return f"/episode/{number}{name and f'/{name}'}"
 
     def robot(self, name: str, arm: int = 0) -> str:
-        """Return the looks of the links of a robot, of two arms those of one."""
+        """Return the link meshes of a robot, or of one of two arms."""
         return f"/robot/{quote(name, safe='')}/links.glb{f'?arm={arm}' if arm else ''}"
 
     def file(self, twin_id: str, name: str, revision: str) -> str:
@@ -100,13 +100,13 @@ class ServerLinks:
 
 @dataclass(frozen=True)
 class FileLinks:
-    """Relative addresses of plain files; ``up`` leads from the page to the folder of the gallery."""
+    """Relative links of static files; ``up`` leads from the page to the folder of the gallery."""
 
     up: str = ""
     live = False
 
     def gallery(self, query: str = "") -> str:
-        """Return the gallery: all cards are on one page."""
+        """Return the gallery, which has all cards on one page."""
         return f"{self.up}index.html"
 
     def twin(self, twin_id: str) -> str:
@@ -118,7 +118,7 @@ class FileLinks:
         return f"{self.up}twins/{quote(twin_id, safe='')}/{quote(name)}"
 
     def scenes(self, start: int = 0) -> str:
-        """Return the list of scenes, from one on."""
+        """Return the list of scenes, beginning with the ``start``-th."""
         return f"{self.up}{list_name(start)}"
 
     def scene(self, scene_id: str, name: str = "") -> str:
@@ -126,7 +126,7 @@ class FileLinks:
         return f"{self.up}scenes/{quote(scene_id, safe='')}/{name or 'index.html'}"
 
     def episodes(self, start: int = 0, outcome: str = "") -> str:
-        """Return the list of episodes, from one on; there is none of one outcome."""
+        """Return the list of episodes, beginning with the ``start``-th; static files have no lists by outcome."""
         return f"{self.up}{list_name(start)}"
 
     def episode(self, number: int, name: str = "") -> str:
@@ -134,7 +134,7 @@ class FileLinks:
         return f"{self.up}episodes/{number}/{name or 'index.html'}"
 
     def robot(self, name: str, arm: int = 0) -> str:
-        """Return the looks of the links of a robot, of two arms those of one."""
+        """Return the link meshes of a robot, or of one of two arms."""
         return f"{self.up}robots/{quote(name, safe='')}/links_{arm}.glb"
 
     def asset(self, name: str) -> str:
@@ -143,5 +143,5 @@ class FileLinks:
 
 
 def list_name(start: int) -> str:
-    """Return the file of a list from one entry on."""
+    """Return the file name of the list page that begins with the ``start``-th entry."""
     return f"index_{start}.html" if start else "index.html"

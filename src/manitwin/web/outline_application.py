@@ -1,4 +1,4 @@
-"""The server's pages for outlines that people draw: a list, a page for each photo, its picture and its mask."""
+"""Server pages for drawing object outlines: the list, a page per photo, its picture and its mask."""
 
 from __future__ import annotations
 
@@ -22,13 +22,15 @@ from manitwin.web.outline_page import MASK, NAME_PATH, PATH, PICTURE, list_page,
 from manitwin.web.request_body import request_body
 
 MOST_BODY_BYTES = 2 << 20
-"""Of an outline as a PNG file, in base64 where words go with it: one of 1024 x 1024 pixels takes some 20 kB, of noise 130 kB."""
+"""Limit on a request body: a PNG mask, in base64 if sent with words. A mask of 1024 x 1024 pixels takes about 20 kB, noise 130
+kB.
+"""
 SENT = ("png", "name", "longest_side_cm")
-"""What a page sends to be kept: an outline in base64, null where none is drawn, and what is typed."""
+"""Fields that a page sends to store: a base64 outline mask (null if none is drawn), and the typed values."""
 
 
 def outline_application(session: OutlineSession) -> Starlette:
-    """Return the pages of a session, without the guard that belongs before them."""
+    """Return the pages of a session without the access guard."""
 
     async def show_list(request: Request) -> Response:
         return await answered(lambda: HTMLResponse(list_page(session, LINKS), headers=NOT_KEPT))
@@ -84,7 +86,7 @@ def outline_application(session: OutlineSession) -> Starlette:
 
 
 def _sent(body: bytes, names: tuple[str, ...]) -> dict[str, Any]:
-    """Return what a page sends; raises UsageError where it is not an object with these names alone."""
+    """Return the body as an object; raises UsageError unless it has exactly these names."""
     sent = parse_json_object(body, "what was sent", UsageError, remedy="reload the page")
     if set(sent) != set(names):
         raise UsageError(f"what was sent has other names than {', '.join(names)}; reload the page")
@@ -99,7 +101,7 @@ def _png(said: object) -> bytes:
 
 
 async def _told(work: Callable[[], Response]) -> Response:
-    """Answer a script from a thread; what a person can mend is said in words."""
+    """Run ``work`` in a thread and answer a script's request; errors are returned as JSON."""
     try:
         return await run_in_threadpool(work)
     except ManiTwinError as error:

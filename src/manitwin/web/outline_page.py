@@ -1,4 +1,4 @@
-"""The pages on which a person draws and names the things in their photos: a list, and a photo with what is cut away tinted."""
+"""HTML pages for drawing and naming objects in photos: a list, and a photo with its background tinted."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ ACTS = (
 
 
 def address_of(key: str, name: str = "") -> str:
-    """Return the address of a photo's page, or of a file of it."""
+    """Return the URL of a photo's page, or of a file of it."""
     return f"{PATH}/{quote(key, safe='')}{name and f'/{name}'}"
 
 
 def next_address(session: OutlineSession, key: str) -> str:
-    """Return the page of the next photo without an outline behind this one, around the end too; the list where none is left."""
+    """Return the page of the next photo without an outline, wrapping around; the list if none is left."""
     keys = list(session.photos)
     at = keys.index(key)
     left = [each for each in (*keys[at + 1 :], *keys[:at]) if each not in session.kept]
@@ -54,7 +54,7 @@ def next_address(session: OutlineSession, key: str) -> str:
 
 
 def list_page(session: OutlineSession, links: Links) -> str:
-    """Return the page of all doubted photos of a data set."""
+    """Return the list of all doubted photos of a data set."""
     cards = "".join(
         f'<li class="card"><a href="{address_of(key)}"><img src="{address_of(key, PICTURE)}" alt="" loading="lazy">'
         f'<span class="name">{text(_called(session, key))}</span><p class="under">'
@@ -111,7 +111,7 @@ def _head(session: OutlineSession) -> str:
 
 
 def _fields(words: Words) -> str:
-    """Return the fields for what the thing is and how long; their order and keys are those of ``FIELDS``."""
+    """Return the input fields for name and length, in the order and with the keys of ``FIELDS``."""
     more = {
         "name": f'list="names" maxlength="{LONGEST["name"]}" placeholder="what it is"',
         "longest_side_cm": 'inputmode="decimal" maxlength="40" placeholder="as usual"',

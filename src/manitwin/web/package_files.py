@@ -1,4 +1,4 @@
-"""Styles and scripts of the pages: files of this package, and three.js out of NiceGUI's wheel."""
+"""Styles and scripts of the pages: files of this package, and three.js extracted from NiceGUI's wheel."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ KINDS = {
         "text/javascript; charset=utf-8",
     ),
 }
-"""All there are, and their types."""
+"""All files and their content types."""
 LICENSE = "three.LICENSE.txt"
 _BUNDLE = ("elements", "scene", "dist", "index.js")
 _MOST_BYTES = 16 << 20
@@ -54,7 +54,7 @@ _EXPORTS = re.compile(r"export\s*\{([^{}]*)\};?\s*(?://# sourceMappingURL=\S*\s*
 
 @cache
 def package_file(name: str) -> bytes:
-    """Return a file of ``KINDS``, or ``LICENSE``; raises KeyError for another name, Unavailable where three.js is not there."""
+    """Return a file of ``KINDS``, or ``LICENSE``; raises KeyError for another name, Unavailable if three.js is missing."""
     if name == THREE:
         return classic_script(_bundle()).encode()
     if name not in KINDS and name != LICENSE:
@@ -63,10 +63,10 @@ def package_file(name: str) -> bytes:
 
 
 def classic_script(module: str) -> str:
-    """Return NiceGUI's bundle, an ES module, as a script that sets ``threeBundle``.
+    """Return NiceGUI's bundle, an ES module, as a classic script that sets ``threeBundle``.
 
-    Browsers load no module from a file's address, and pages on a disk are to be the same as those of the server. Raises
-    Unavailable where it does not end in one list of exports with what is wanted.
+    Browsers load no modules from file URLs, and static files share their pages with the server. Raises Unavailable if the module
+    does not end in one export list with the required names.
     """
     found = _EXPORTS.search(module)
     pairs = [part.split() for part in found[1].split(",") if part.strip()] if found else []
@@ -81,7 +81,7 @@ def classic_script(module: str) -> str:
 
 
 def _bundle() -> str:
-    spec = find_spec("nicegui")  # found, not imported: of that package, this file alone is used
+    spec = find_spec("nicegui")  # found, not imported: only this file of the package is used
     if spec is None or spec.origin is None:
         raise Unavailable(
             "nicegui: is not installed, and three.js lies in it; install the packages of requirements.lock"

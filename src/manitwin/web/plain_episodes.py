@@ -1,4 +1,4 @@
-"""The pages of recorded episodes as plain files: the list, each one in 3D, its robot's links and the pages of its twins."""
+"""Static pages of recorded episodes: the list, a 3D view of each, the robot's links and the pages of the twins."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DATA_SCRIPT = "episode_view.js"
 def write_episodes(
     out: Path, episodes: EpisodeFolders, numbers: Sequence[int], title: str, on_page: Callable[[str], None]
 ) -> Written:
-    """Write the pages of some episodes below a folder; one whose twins or robot are not there is left out."""
+    """Write the pages of some episodes to a folder; episodes with missing twins or robot are left out."""
     done, links, count = Written((*SCRIPTS, EPISODE_TIMELINE, EPISODE_VIEWER)), FileLinks(UP), len(episodes)
     writer = _Writer(out, episodes, done)
     found: dict[int, tuple[dict[str, Any], list[str]]] = {}
@@ -53,9 +53,9 @@ class _Writer:
         self._robots: set[str] = set()
 
     def write_data(self, number: int) -> tuple[dict[str, Any], list[str]]:
-        """Write what the page of an episode draws; returns what is no array of it, and the addresses of the page's scripts.
+        """Write the data of an episode's page; return its data except arrays, and the relative URLs of the page's scripts.
 
-        Raises ManiTwinError where it cannot be shown whole.
+        Raises ManiTwinError if it cannot be shown completely.
         """
         episodes = self._episodes
         if episodes.twins is None:
@@ -72,7 +72,7 @@ class _Writer:
         return said, [*models, *robots]
 
     def _write_robots(self, name: str) -> list[str]:
-        """Write the links of the arms that are not there yet; returns the addresses of their scripts."""
+        """Write the missing link meshes of the arms; return the relative URLs of their scripts."""
         robot = self._episodes.robot(name)
         scripts = []
         for number, arm in enumerate(robot.arms or (robot,)):

@@ -1,4 +1,4 @@
-"""Pages as plain files, of chosen twins, scenes or episodes: to open from a disk, put on any web host, or send to somebody."""
+"""Static pages of selected twins, scenes or episodes, to open from disk, host on any web server, or send."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from manitwin.web.trial_player import TrialPlayer
 from manitwin.web.twin_page import SCRIPTS
 
 MOST_PAGES = 2_000
-"""Of one folder: the gallery of twins is one page, and each twin takes a megabyte or two."""
+"""Maximum number of pages of a folder: the gallery of twins is a single page, and a twin takes a megabyte or two."""
 Drawn = TypeVar("Drawn")
 
 
 @dataclass
 class PlainFiles:
-    """What was written: how many of each, bytes in all, and those that were left out with the reason, by id."""
+    """Summary: numbers of pages by kind, total bytes, and what was left out with the reason, by id."""
 
     twins: int = 0
     scenes: int = 0
@@ -56,13 +56,13 @@ def write_plain_files(
     twins: str | None = None,
     on_page: Callable[[str], None] = lambda name: None,
 ) -> PlainFiles:
-    """Write ``out``, a new folder, with the pages of a place: a data set or one twin's folder, scenes, or episodes.
+    """Write the pages of a place to a new folder ``out``: a data set, one twin's folder, scenes, or episodes.
 
-    Of a data set the accepted twins that satisfy ``where``; of scenes and episodes with the pages of their twins, which of
-    episodes are in the data set ``twins`` where that is not the one that they were made from. ``sample`` are so many, drawn by
-    the seed. Of each gripper of a twin the trials of its first ``trials`` grasps can be played. The same input, sample and seed
-    give the same bytes. An input that is a photo is not written: it may hold more than the twin, such as the place where it was
-    taken. Raises UsageError where there are none, or more than ``MOST_PAGES``.
+    For a data set, these are the accepted twins that satisfy ``where``. Scenes and episodes are written with the pages of their
+    twins; ``twins`` names the data set of an episode's twins if it is not the one they were made from. ``sample`` is the number
+    of pages, drawn by the seed. For each gripper of a twin, the trials of its first ``trials`` grasps can be played. Equal input,
+    sample and seed give equal bytes. Input photos are not written, since they may contain private data such as the location.
+    Raises UsageError if there are no pages, or more than ``MOST_PAGES``.
     """
     with TemporaryDirectory(prefix="manitwin-view-") as cache, TrialPlayer() as player:
         if where and (is_episodes(place) or is_scenes(place)):
@@ -84,7 +84,7 @@ def write_plain_files(
 
 
 def chosen_of(all_of_them: Sequence[Drawn], place: str, sample: int | None, seed: int, none: str) -> list[Drawn]:
-    """Return all, or ``sample`` of them drawn by the seed, in their order; raises UsageError for none and for too many."""
+    """Return all items, or ``sample`` of them drawn by the seed, in order; raises UsageError for none and for too many."""
     chosen = list(all_of_them)
     if sample is not None and sample < len(chosen):
         drawn = np.random.default_rng(seed).choice(len(chosen), sample, replace=False)
@@ -97,7 +97,7 @@ def chosen_of(all_of_them: Sequence[Drawn], place: str, sample: int | None, seed
 
 
 def _rows(place: str, twins: TwinFolders, sample: int | None, where: str) -> tuple[list[dict[str, Any]], str]:
-    """Return what the cards say of the twins, and the title of them all."""
+    """Return the card rows of the twins, and the title of the gallery."""
     if twins.only is None:
         root = DatasetRoot(place)
         return Gallery(root).chosen(View(where=where)), Path(root.path).name or "twins"
@@ -157,7 +157,7 @@ def _write_package_files(fresh: Path, *scripts: str) -> int:
 
 
 def _row(twin: Twin) -> dict[str, Any]:
-    """Return what a card says of one twin; raises UsageError for a rejected one."""
+    """Return the card row of one twin; raises UsageError for a rejected one."""
     record = twin.record
     if record.physical is None or record.language is None or record.grasps is None:
         raise UsageError(f"{twin.folder}: is no accepted twin; plain files show those that were accepted")

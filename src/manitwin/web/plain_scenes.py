@@ -1,4 +1,4 @@
-"""The pages of scenes as plain files: the list, each scene in 3D, and the pages of the twins that stand in them."""
+"""Static pages of scenes: the list, a 3D view of each scene, and the pages of their twins."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DATA_SCRIPT = "scene_view.js"
 def write_scenes(
     out: Path, scenes: SceneFolders, scene_ids: Sequence[str], title: str, on_page: Callable[[str], None]
 ) -> Written:
-    """Write the pages of some scenes below a folder; one whose twins are not all there is left out."""
+    """Write the pages of some scenes to a folder; scenes with missing twins are left out."""
     done, links = Written((*SCRIPTS, SCENE_VIEWER)), FileLinks(UP)
     found: dict[str, tuple[SceneRecord, list[str]]] = {}
     for scene_id in scene_ids:
@@ -46,7 +46,7 @@ def write_scenes(
 
 
 def _write_data(out: Path, scenes: SceneFolders, scene_id: str, done: Written) -> tuple[SceneRecord, list[str]]:
-    """Write what a scene's page draws and its twins; returns its record and the addresses of the scripts of their meshes."""
+    """Write a scene's document and its twins; return its record and the relative URLs of the scripts with their meshes."""
     record = scenes.scene(scene_id)
     models = done.write_twins(out, scenes.twins, (each.twin_id for each in record.objects))
     document = scene_document(record, scenes.twins, FileLinks(UP))

@@ -1,6 +1,6 @@
-"""Scripts that hold what a server would be asked for: browsers read no JSON and no GLB from the address of a file, but scripts.
+"""Data files as scripts for static pages, since browsers load scripts from file URLs but neither JSON nor GLB.
 
-Each sets one name of ``manitwinFiles`` (stage.js): the file's path below the folder of all.
+Each script sets one entry of ``manitwinFiles`` (stage.js), keyed by the file's path relative to the root folder.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from manitwin.web.trial_player import TrialPlayer
 from manitwin.web.twin_page import DATA_SCRIPT, MODEL_SCRIPT, TRIALS_SCRIPT, twin_page
 
 UP = "../../"
-"""From any page but the first to the folder of all."""
+"""Path from any page except the first to the root folder."""
 NAMES = FileLinks()
 
 
@@ -32,17 +32,17 @@ def document_script(name: str, document: bytes) -> bytes:
 
 
 def binary_script(name: str, content: bytes) -> bytes:
-    """Return the script of a file that is no text."""
+    """Return the script of a binary file, in base64."""
     return b'(globalThis.manitwinFiles??={})[%s]="%s";\n' % (json.dumps(name).encode(), base64.b64encode(content))
 
 
 def write_twin(
     out: Path, twin: Twin, *, player: TrialPlayer | None = None, trials: int = 0, with_gallery: bool = True
 ) -> int:
-    """Write the page of a twin with its files, all or nothing of them; returns their bytes.
+    """Write the page of a twin with its files, all or none; return their total bytes.
 
-    With a ``player``, the first ``trials`` grasps of each gripper, which lie far apart, can be played. Raises TwinError for a
-    twin that cannot be read whole: what is sent to others is, and names no folder of this machine.
+    With a ``player``, the trials of the first ``trials`` grasps of each gripper, which are far apart, can be played. Raises
+    TwinError for a twin that cannot be read completely, since the error messages of partial pages name local folders.
     """
     document = twin_document.twin_document(twin)
     if document["unreadable"]:
@@ -64,13 +64,13 @@ def write_twin(
 
 
 def _trials(twin: Twin, document: dict[str, Any], player: TrialPlayer, count: int) -> bytes:
-    """Return the script of the trials of so many grasps of each gripper that comes with the package."""
+    """Return the script of the trials of the first ``count`` grasps of each gripper shipped with the package."""
     name, scripts = NAMES.file(twin.record.twin_id, trial_document.DOCUMENT, ""), []
     for gripper, columns in document["grasps"].items():
         for grasp_id in columns["id"][:count]:
             try:
                 told = player.play(twin, gripper, grasp_id)
-            except UsageError:  # of a gripper or an engine that is not of the package: the page says so, grasp by grasp
+            except UsageError:  # for other grippers or engines, the page shows a message per grasp
                 break
             scripts.append(document_script(f"{name}?{urlencode({'gripper': gripper, 'grasp': grasp_id})}", told))
     return b"".join(scripts)
@@ -79,7 +79,7 @@ def _trials(twin: Twin, document: dict[str, Any], player: TrialPlayer, count: in
 def read_file(twin: Twin, name: str) -> bytes:
     """Return the content of a file that a page may have.
 
-    Raises TwinError and UsageError as ``open_file`` does, and TwinError for a file that is not the one of the record.
+    Raises TwinError and UsageError as ``open_file`` does, and TwinError if the file does not match the record's digest.
     """
     content = b"".join(open_file(twin.folder, name).chunks())
     if hashlib.sha256(content).hexdigest() != twin.record.files.get(name):
@@ -88,7 +88,7 @@ def read_file(twin: Twin, name: str) -> bytes:
 
 
 def write(path: Path, content: bytes) -> int:
-    """Write a file, and the folders that it lies in; returns its bytes."""
+    """Write a file and its parent folders; return its number of bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content)
     return len(content)

@@ -1,4 +1,4 @@
-"""The twins that stand in scenes and episodes of plain files: each is written once, with its page."""
+"""Twins of scenes and episodes in static files: each twin is written once, with its page."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Made = TypeVar("Made")
 
 @dataclass
 class Written:
-    """What was written of scenes or episodes: pages, ids and bytes of their twins, and why which were ``left_out``, by name.
+    """Summary of written scenes or episodes: pages, ids and bytes of their twins, and reasons for those ``left_out``, by name.
 
     ``scripts`` are those that every page needs.
     """
@@ -30,7 +30,7 @@ class Written:
     left_out: dict[str, str] = field(default_factory=dict)
 
     def wholly(self, name: str, work: Callable[[], Made]) -> Made | None:
-        """Return what ``work`` makes; where it raises, note the reason under ``name`` in ``left_out`` and return None."""
+        """Return the result of ``work``; if it raises, record the reason under ``name`` in ``left_out`` and return None."""
         try:
             return work()
         except ManiTwinError as error:
@@ -38,9 +38,9 @@ class Written:
             return None
 
     def write_twins(self, out: Path, twins: TwinFolders, twin_ids: Iterable[str]) -> list[str]:
-        """Write the twins that are not written yet; returns the addresses of the scripts with their meshes, for a page of them.
+        """Write the twins that are not yet written; return the relative URLs of the scripts with their meshes.
 
-        Raises UsageError and TwinError for one that is gone or cannot be read whole.
+        Raises UsageError and TwinError for a twin that is missing or cannot be read completely.
         """
         ids = sorted(set(twin_ids))
         for twin_id in ids:

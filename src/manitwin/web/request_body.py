@@ -1,4 +1,4 @@
-"""The body of a request, up to a limit."""
+"""Size-limited reading of request bodies."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from starlette.requests import Request
 
 
 async def request_body(request: Request, most_bytes: int) -> bytes:
-    """Return the body of a request; empty where it has more than ``most_bytes``, the rest of which is not read."""
+    """Return the body of a request; empty if it exceeds ``most_bytes``, in which case the rest is not read."""
     parts, size = [], 0
     async for part in request.stream():
         size += len(part)

@@ -1,4 +1,4 @@
-"""The server's pages of a review: they are an annotator's own, whom the guard knows by their cookie."""
+"""Server pages of a review, personalized by the annotator that the guard has authenticated."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _SHAPES = (DOCUMENT, trial_document.DOCUMENT, "visual.glb")
 
 
 def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSession) -> Starlette:
-    """Return the pages of a review, and ``pages`` of the twins behind them, pictures and shapes alone where it is blind."""
+    """Return the pages of a review, falling back to ``pages`` of the twins; in a blind review only their pictures and shapes."""
 
     async def onward(request: Request) -> Response:
         return await _answered(lambda: _onward(session, twins, _person(request), request.query_params.get("after")))
@@ -91,7 +91,7 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
 
 
 class _Blind:
-    """Gives shapes and pictures, and no page or record that says who chose what, and how sure they were."""
+    """Serves shapes and pictures only, and hides pages and records with the origin and confidence of annotations."""
 
     def __init__(self, pages: ASGIApp):
         self._pages = pages
@@ -110,7 +110,7 @@ def _person(request: Request) -> str:
 
 
 def _onward(session: ReviewSession, twins: TwinFolders, person: str, after: str | None) -> Response:
-    """Lead to the first twin of the queue that can be read: one that cannot must not keep anybody from the others."""
+    """Redirect to the first readable twin of the queue, so that an unreadable one does not block the others."""
     _require_known(session, person)
     unread: dict[str, str] = {}
     for twin_id in session.queue(person, after):
@@ -131,7 +131,7 @@ def _page(session: ReviewSession, twin: Twin, person: str) -> Response:
         stored = session.store.of_twin(twin_id, person)
         draft = None if stored is None else stored.review.model_dump(mode="json")
     if draft is not None and draft.get("revision") != twin.record.revision:
-        draft = None  # said of another twin, whose points may lie elsewhere
+        draft = None  # it refers to another revision, whose points may lie elsewhere
     page = review_page(twin, LINKS, person, session.progress(person), draft, blind=session.blind)
     return HTMLResponse(page, headers=_NOT_KEPT)
 
@@ -148,7 +148,7 @@ def _require_known(session: ReviewSession, person: str) -> None:
 
 
 def _said(body: bytes, what: str, person: str) -> dict[str, Any]:
-    """Return what a page sends; raises UsageError where it was made for another annotator than the browser's cookie is of."""
+    """Return the body as an object; raises UsageError if it belongs to another annotator than the browser's cookie."""
     said = parse_json_object(body, what, UsageError)
     if said.pop("annotator", person) != person:
         raise UsageError(
@@ -158,7 +158,7 @@ def _said(body: bytes, what: str, person: str) -> dict[str, Any]:
 
 
 async def _answered(work: Callable[[], Response], *, as_json: bool = False) -> Response:
-    """Answer from a thread; what a person can mend is said in words."""
+    """Run ``work`` in a thread and return its response; errors are returned as text or JSON."""
     try:
         return await run_in_threadpool(work)
     except ManiTwinError as error:

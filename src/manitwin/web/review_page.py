@@ -1,4 +1,4 @@
-"""The page on which a person judges a twin: the 3D view, what the twin says in each dimension, answers and corrections."""
+"""HTML page for judging a twin: 3D view, annotations by dimension, answers and corrections."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ KEYS = (
     ("undo", "Backspace", "take the last review back"),
     ("later", "s", "leave it for later"),
 )
-"""What a key does at first: action, key, words. Digits lead to dimensions, Escape out of a field."""
+"""Default keys: action, key, description. Digits select dimensions, Escape leaves a field."""
 SHORT = tuple((action, key, words.split(",")[0]) for action, key, words in KEYS)
 PATH = "/review"
 MOST_UNREAD = 20
-"""Twins that cannot be read of which the reason is told."""
+"""Maximum number of unreadable twins listed with the reason."""
 
 
 def review_page(twin: Twin, links: Links, annotator: str, progress: Progress, draft: Any, *, blind: bool) -> str:
-    """Return the page of an accepted twin; ``blind`` leaves out who says so, how sure they are, and why."""
+    """Return the page of an accepted twin; ``blind`` hides origin, confidence and rationale of annotations."""
     record = twin.record
     fields = "".join(_dimension(record, place, dimension, blind) for place, dimension in enumerate(DIMENSIONS, 1))
     body = (
@@ -68,7 +68,7 @@ def review_page(twin: Twin, links: Links, annotator: str, progress: Progress, dr
 
 
 def done_page(links: Links, annotator: str, progress: Progress, unread: Mapping[str, str]) -> str:
-    """Return the page of somebody whose queue is empty, but for twins that cannot be read: ``unread``, the reasons by id."""
+    """Return the page for an empty queue; ``unread`` maps the ids of unreadable twins to reasons."""
     first = list(unread.values())[:MOST_UNREAD]
     lacking = "".join(f'<li class="error">{text(reason)}</li>\n' for reason in first)
     if lacking:

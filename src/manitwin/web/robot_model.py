@@ -1,4 +1,4 @@
-"""The looks of a robot's links as one small GLB, for the browser to move."""
+"""Simplified visual meshes of a robot's links as one small GLB for the 3D view."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from manitwin.geometry.repair.welding import weld_equal
 from manitwin.render.simplification import simplified
 
 TOLERANCE_M = 0.0015
-"""How far simplified surfaces may be off: about a pixel where a whole arm fills 1,000 of them."""
+"""Maximum deviation of simplified surfaces: about a pixel if a whole arm fills 1,000 pixels."""
 
 
 def shown_links(urdf: str) -> list[str]:
-    """Return the names of the links that have looks, in the order of their numbers in the GLB; raises AssetError."""
+    """Return the names of the links with visual meshes, in the order of their numbers in the GLB; raises AssetError."""
     return list(link_visuals(urdf))
 
 
 @lru_cache(maxsize=4)
 def robot_glb(urdf: str) -> bytes:
-    """Return a GLB in which the parts of the link number n, in its own frame, are called ``l<n>p<k>``; kept for the next call.
+    """Return a GLB whose parts ``l<n>p<k>`` belong to link n, in its own frame; cached.
 
-    Textures are left out: a part has the base colour of its material. Parts of a link that look alike are one. Raises AssetError.
+    Textures are left out: a part has the base colour of its material. Parts of a link with equal materials are merged. Raises
+    AssetError.
     """
     parts = []
     for number, visuals in enumerate(link_visuals(urdf).values()):
@@ -37,7 +38,7 @@ def robot_glb(urdf: str) -> bytes:
 
 
 def _by_look(visuals: Iterable[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
-    """Return parts joined by colour, metal and roughness, with fewer triangles."""
+    """Return parts merged by colour, metallic and roughness, with simplified geometry."""
     alike: dict[tuple[float, ...], list[trimesh.Trimesh]] = {}
     for each in visuals:
         material = material_of(each)

@@ -1,4 +1,4 @@
-"""The server's pages of scenes: the list, each scene in 3D, and the pages and files of the twins that stand in them."""
+"""Server pages of scenes: the list, a 3D view of each scene, and the pages and files of their twins."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from manitwin.web.twin_document import document_bytes
 
 
 def scene_application(pages: ASGIApp, scenes: SceneFolders, title: str) -> Starlette:
-    """Return the pages of scenes, and ``pages`` of the twins behind them, without the guard that belongs before all."""
+    """Return the pages of scenes, falling back to ``pages`` of their twins, without the access guard."""
 
     async def show_list(request: Request) -> Response:
         if len(scenes.ids) == 1:
@@ -60,7 +60,7 @@ def _list(scenes: SceneFolders, start: str, title: str) -> Response:
 def _read(scenes: SceneFolders, scene_id: str) -> SceneRecord | str:
     try:
         return scenes.scene(scene_id)
-    except UsageError as error:  # a broken scene ends nothing but its own line
+    except UsageError as error:  # a broken scene affects only its own line
         return str(error)
 
 

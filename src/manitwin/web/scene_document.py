@@ -1,4 +1,4 @@
-"""What the 3D view draws of a scene, as one JSON document: furniture, objects where they stand, and the robot's workspace."""
+"""JSON document of a scene for the 3D view: furniture, placed objects, and the robot's workspace."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from manitwin.web.served_files import MODEL, TwinFolders
 
 DOCUMENT = "scene_view.json"
 COLORS = {"wood": "#b58b5a", "metal": "#9aa3ab", "marble": "#d6d4cf", "cloth": "#8c93b8"}
-"""Of furniture, by its material: the pictures of a scene have its texture."""
+"""Furniture colours by material; rendered pictures of a scene use textures instead."""
 PLAIN = "#b9b3a8"
 _DECIMALS = 5
 
 
 def scene_document(record: SceneRecord, twins: TwinFolders, links: Links) -> dict[str, Any]:
-    """Return the document, in metres, world frame, quaternions wxyz; what cannot be read stands in ``unreadable``, a line each.
+    """Return the document in metres, world frame, quaternions wxyz; ``unreadable`` lists what cannot be read.
 
-    ``hulls`` are those of each twin, in its object frame, by its id; ``model`` is the address of an object's mesh, None
-    where its twin is not there.
+    ``hulls`` are the collision hulls of each twin, by id, in its object frame; ``model`` is the URL of an object's mesh, None if
+    its twin is missing.
     """
     hulls: dict[str, list[dict[str, Any]]] = {}
     found: dict[str, Twin] = {}
@@ -69,7 +69,7 @@ def scene_document(record: SceneRecord, twins: TwinFolders, links: Links) -> dic
 
 
 def furniture_boxes(furniture: Furniture) -> list[dict[str, Any]]:
-    """Return the boxes of furniture: middle and half extents, m, world frame, and a colour."""
+    """Return the boxes of furniture: centre and half extents in metres, world frame, and a colour."""
     return [
         {
             "name": box.name,
@@ -92,7 +92,7 @@ def _hulls(twin: Twin) -> list[dict[str, Any]]:
 
 
 def _robot(name: str | None) -> tuple[dict[str, Any] | None, str | None]:
-    """Return the workspace of a robot, whose base is the world's origin; and why it cannot be told where that is so."""
+    """Return the workspace of a robot, whose base is the world origin, or None with the reason if it is unavailable."""
     if name is None:
         return None, None
     try:

@@ -1,4 +1,4 @@
-"""The scenes of a run that a page may show, by their ids, and the twins that stand in them."""
+"""Access to the scenes of a run by id, and to their twins."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from manitwin.web.served_files import TwinFolders
 
 
 def is_scenes(place: str) -> bool:
-    """Tell whether a place holds scenes: a run of ``manitwin layout``, a scene's folder or its file."""
+    """Return whether a place holds scenes: a run of ``manitwin layout``, a scene's folder or its file."""
     return "://" not in place and bool(scene_files(Path(place)))
 
 
 class SceneFolders:
-    """The scenes at a place in the order of their ids, and ``twins`` of the data set that they were sampled from.
+    """The scenes at a place in id order, and ``twins`` of the data set that they were sampled from.
 
-    ``cache`` takes the twins of a data set at a URL. Raises UsageError where there are no scenes, or no data set of theirs.
+    ``cache`` stores the twins of a data set at a URL. Raises UsageError if there are no scenes, or their data set is missing.
     """
 
     def __init__(self, place: str, cache: Path):
@@ -31,12 +31,12 @@ class SceneFolders:
         self.twins = TwinFolders(dataset, cache if "://" in dataset else None, "put it back, or make the scenes again")
 
     def scene(self, scene_id: str) -> SceneRecord:
-        """Return a scene; raises UsageError where there is none of this id, or it cannot be read."""
+        """Return a scene; raises UsageError if the id is unknown or it cannot be read."""
         if scene_id not in self._files:
             raise UsageError("there is no scene of this name")
         return read_scene(self._files[scene_id])
 
     def beside(self, scene_id: str) -> tuple[str | None, str | None]:
-        """Return the ids before and after one."""
+        """Return the ids of the previous and the next scene; None at the ends."""
         at = self.ids.index(scene_id)
         return (self.ids[at - 1] if at else None), (self.ids[at + 1] if at + 1 < len(self.ids) else None)

@@ -1,4 +1,4 @@
-"""The pages of scenes as HTML: the list of a run's scenes, and one scene in 3D with what stands in it."""
+"""HTML pages of scenes: the list of a run's scenes, and one scene with its 3D view and objects."""
 
 from __future__ import annotations
 
@@ -17,12 +17,14 @@ LAYERS = (
     ("supports", "S", "Supports", False),
     ("workspace", "W", "Workspace of the robot", True),
 )
-"""What the 3D view can show: name, key, words, and whether it does at first."""
+"""Layers of the 3D view: name, key, label, and whether initially visible."""
 KEYS = (("← → ↑ ↓", "turn"), ("+ −", "nearer, farther"), ("0", "from the front again"))
 
 
 def list_page(records: Sequence[SceneRecord | str], place: int, count: int, title: str, links: Links) -> str:
-    """Return a page of the list: ``records`` are those from ``place`` on of ``count``, or a line for one that cannot be read."""
+    """Return a page of the list; ``records`` are the scenes from ``place`` on, of ``count``, or error messages for unreadable
+    ones.
+    """
     rows = "".join(_row(each, links) for each in records)
     pages = "".join(
         f'<a href="{text(links.scenes(start))}"{" aria-current=page" if start == place else ""}>'
@@ -57,7 +59,7 @@ def scene_page(
 ) -> str:
     """Return the page of a scene; ``before`` and ``after`` are the ids of its neighbours in the list.
 
-    ``data`` are the scripts with what a server would be asked for.
+    ``data`` are scripts with the data that a server would otherwise provide.
     """
     steps = "".join(
         f'<a rel="{rel}" href="{text(links.scene(scene_id))}">{words}</a>'

@@ -1,4 +1,4 @@
-"""Serve the pages of a data set or a twin on this machine until interrupted."""
+"""Local page server of a data set, twin, scenes, episodes, reviews or outlines; runs until interrupted."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ from manitwin.web.tokens import Tokens
 from manitwin.web.trial_player import TrialPlayer
 
 MOST_REQUESTS = 256
-"""At once; more are told to come again (503)."""
+"""Maximum number of concurrent requests; others get status 503."""
 KEEP_ALIVE_S = 20
 CLOSING_S = 2
-"""What open requests are waited for at the end."""
+"""Seconds to wait for open requests at shutdown."""
 BETWEEN_LINKS_S = 2.0
 
 
 def bound_socket(host: str, port: int) -> socket.socket:
-    """Return a socket that listens on a host and port (0: one that is free); raises UsageError where it cannot."""
+    """Return a socket that listens on a host and port (0: any free port); raises UsageError on failure."""
     bare = host.strip("[]")
     try:
         found = socket.getaddrinfo(bare, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
@@ -68,7 +68,7 @@ def bound_socket(host: str, port: int) -> socket.socket:
 
 
 def _is_no_end_of_waiting(record: logging.LogRecord) -> bool:
-    """Leave out what uvicorn says of answers that are cut short as the server is ended: that is what was asked for."""
+    """Drop uvicorn's messages about requests that are cancelled at shutdown, which is intended."""
     cancelled = record.exc_info is not None and isinstance(record.exc_info[1], asyncio.CancelledError)
     return not cancelled and not str(record.msg).startswith("Cancel %s running task(s)")
 
@@ -77,7 +77,7 @@ logging.getLogger("uvicorn.error").addFilter(_is_no_end_of_waiting)
 
 
 class _Server(uvicorn.Server):
-    """Leaves signals to the command, which ends it in order; uvicorn would raise them again afterwards."""
+    """Leaves signal handling to the command; uvicorn would raise the signals again afterwards."""
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -85,10 +85,10 @@ class _Server(uvicorn.Server):
 
 
 class PageServer:
-    """A server of pages behind the guard: ``link`` makes a link of one use, ``run`` serves until ``stop`` or an interrupt.
+    """Server of guarded pages: ``link`` makes a one-time link, ``run`` serves until ``stop`` or an interrupt.
 
-    ``on_new_link`` is told a new link when somebody came with one that was used; at most one in two seconds. ``tokens`` are those
-    of a server before; port 0 is then its port where that is free, else any that is free.
+    ``on_new_link`` receives a new link after somebody opened a used one, at most one in two seconds. ``tokens`` are those of a
+    previous server; port 0 then means its port if that is free, else any free port.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class PageServer:
         self.tokens.served_at(self.port)
         self._on_new_link, self._told = on_new_link, float("-inf")
         guard = Guard(app, self.names, self.tokens, self._used)
-        # no log of requests: their addresses have tokens in them
+        # Requests are not logged: their URLs contain tokens.
         config = uvicorn.Config(
             guard, log_config=None, access_log=False, lifespan="off", server_header=False, limit_concurrency=MOST_REQUESTS,
             timeout_keep_alive=KEEP_ALIVE_S, timeout_graceful_shutdown=CLOSING_S, ws="none",
@@ -119,24 +119,24 @@ class PageServer:
     def _as_before(host: str, port: int) -> socket.socket:
         try:
             return bound_socket(host, port)
-        except UsageError:  # another program has it now
+        except UsageError:  # another program uses it now
             return bound_socket(host, 0)
 
     def address(self) -> str:
-        """Return the address of the first page."""
+        """Return the URL of the first page."""
         shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)
         return f"http://{f'[{shown}]' if ':' in shown else shown}:{self.port}"
 
     def link(self, onward: str = "/", person: str = "") -> str:
-        """Return a link of one use that leads to a page."""
+        """Return a one-time link that leads to a page."""
         return f"{self.address()}{ENTER}?token={self.tokens.link(person)}&next={quote(onward, safe='/')}"
 
     def run(self) -> None:
-        """Serve until ``stop``, or an interrupt, which is raised as KeyboardInterrupt."""
+        """Serve until ``stop``, or until an interrupt, which is raised as KeyboardInterrupt."""
         asyncio.run(self._server.serve(sockets=[self.socket]))
 
     def stop(self) -> None:
-        """End what is served."""
+        """Stop serving."""
         self._server.should_exit = True
 
     def _used(self) -> None:
@@ -147,9 +147,9 @@ class PageServer:
 
 
 def pages_of(place: str, cache: Path, twins: str | None = None, trials: TrialPlayer | None = None) -> ASGIApp:
-    """Return the pages of a data set, a twin's folder, scenes, or episodes, whose twins are in the data set ``twins``.
+    """Return the pages of a data set, a twin's folder, scenes, or episodes whose twins are in the data set ``twins``.
 
-    Raises UsageError where it is none of them, or has no index; EpisodesError for a file of episodes that cannot be read.
+    Raises UsageError for any other place or a missing index, and EpisodesError for an episode file that cannot be read.
     """
     if is_episodes(place):
         episodes = EpisodeFolders(place, cache, twins)
@@ -180,7 +180,7 @@ def review(
     on_used_link: Callable[[PageServer], None],
     tokens: Tokens,
 ) -> None:
-    """Serve the pages of a review until interrupted; ``on_used_link`` is called when somebody came with a link that was used."""
+    """Serve the pages of a review until interrupted; ``on_used_link`` is called when somebody opens a used link."""
     running: list[PageServer] = []
     with TrialPlayer() as trials:
         pages = application(None, twins := TwinFolders(place), "review", trials)
@@ -197,7 +197,7 @@ def draw_outlines(
     on_ready: Callable[[PageServer], None],
     on_new_link: Callable[[str], None],
 ) -> None:
-    """Serve the pages on which outlines are drawn until interrupted; ``on_ready`` is called when it listens."""
+    """Serve the outline drawing pages until interrupted; ``on_ready`` is called once the server listens."""
     _run(PageServer(outline_application(session), host, port, on_new_link), on_ready)
 
 
@@ -209,7 +209,7 @@ def serve(
     on_new_link: Callable[[str], None],
     twins: str | None = None,
 ) -> None:
-    """Serve the pages that ``pages_of`` gives until interrupted; ``on_ready`` is called when it listens."""
+    """Serve the pages of ``pages_of`` until interrupted; ``on_ready`` is called once the server listens."""
     with tempfile.TemporaryDirectory(prefix="manitwin-view-") as cache, TrialPlayer() as trials:
         _run(PageServer(pages_of(place, Path(cache), twins, trials), host, port, on_new_link), on_ready)
 

@@ -1,4 +1,4 @@
-"""The files of twins that a page may have: those of a fixed list of names, of a twin that is there, and no other."""
+"""Allow-list of twin files that pages may read."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ INPUTS = {
     "source.jpeg": "image/jpeg",
     "source.webp": "image/webp",
 }
-"""Inputs that are pictures which a browser shows."""
+"""Input pictures that browsers can display, with their content types."""
 NAMED = {CARD: "image/png", MODEL: "model/gltf-binary", RECORD: "application/json", **INPUTS}
 VIEWS = re.compile(r"views/(rgb_[0-9]{2}|marked_[0-9]{2}|closer_f[0-9]+)\.webp")
 MOST_BYTES = 256 << 20
-"""Of a file that is given to a browser, which keeps it in memory more than once. A scan's GLB with its textures has 100 MB."""
+"""Size limit of a file given to a browser, which keeps several copies in memory. A scan's GLB with textures has 100 MB."""
 CHUNK_BYTES = 1 << 18
 _TWIN_ID = re.compile(r"[0-9A-Za-z_][0-9A-Za-z_.-]{0,99}")
 
 
 @dataclass(frozen=True)
 class ServedFile:
-    """An open file of a twin: its bytes in order are ``chunks``, which also closes it."""
+    """An open file of a twin; ``chunks`` yields its bytes and closes it."""
 
     stream: BinaryIO
     size_bytes: int
     content_type: str
 
     def chunks(self) -> Iterator[bytes]:
-        """Yield its bytes, no more than it had when it was opened."""
+        """Yield the bytes, at most as many as the file had when it was opened."""
         left = self.size_bytes
         with self.stream:
             while left and (part := self.stream.read(min(left, CHUNK_BYTES))):
@@ -48,14 +48,14 @@ class ServedFile:
 
 
 UNLIKE_INDEX = "put it back, or write the index again (manitwin index)"
-"""What helps where an index names a twin that is not there."""
+"""Remedy if an index names a missing twin."""
 
 
 class TwinFolders:
-    """The folders of the twins of a data set, or of one twin, by their ids.
+    """The folders of the twins of a data set, or of one twin, by id.
 
-    ``cache`` takes those of a data set at a URL, ``remedy`` is what helps where a twin is not there. Raises UsageError where
-    there is no such place.
+    ``cache`` stores the twins of a data set at a URL; ``remedy`` ends the error message for a missing twin. Raises UsageError if
+    the place does not exist.
     """
 
     def __init__(self, place: str, cache: Path | None = None, remedy: str = UNLIKE_INDEX):
@@ -64,7 +64,7 @@ class TwinFolders:
         self._source = None if self.only else TwinSource(place, cache, remedy)
 
     def folder(self, twin_id: str) -> Path:
-        """Return a twin's folder; raises UsageError where there is none of this id."""
+        """Return a twin's folder; raises UsageError for an unknown id."""
         if not _TWIN_ID.fullmatch(twin_id):
             raise UsageError("there is no twin of this name")
         if self.only is not None:
@@ -77,12 +77,12 @@ class TwinFolders:
         return self._source.folder(twin_id)
 
     def twin(self, twin_id: str) -> Twin:
-        """Return a twin; raises UsageError where there is none, TwinError where it cannot be read."""
+        """Return a twin; raises UsageError for an unknown id, TwinError if it cannot be read."""
         return Twin(self.folder(twin_id))
 
 
 def open_file(folder: Path, name: str) -> ServedFile:
-    """Open a file of a twin by a name of the list; raises UsageError for another name, TwinError where it cannot be given."""
+    """Open an allowed file of a twin; raises UsageError for another name, TwinError if it is missing or too large."""
     kind = "image/webp" if VIEWS.fullmatch(name) else NAMED.get(name)
     if kind is None:
         raise UsageError("there is no file of this name")

@@ -1,4 +1,4 @@
-"""Links of one use, and the secrets of those who used one: in memory, or kept in a file over the end of a server."""
+"""One-time links and session secrets, in memory or stored in a file that outlives the server."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from manitwin.formats.json_file import read_json_object
 from manitwin.twin.store import file_beside
 
 MOST_LINKS = 64
-"""Links of one person that were made and not used: the oldest are forgotten."""
+"""Maximum number of unused links per person; the oldest are discarded."""
 LASTING_S = 30 * 24 * 3600.0
-"""How long links and cookies that are kept are good for."""
+"""Validity of stored links and cookies in seconds."""
 _MOST_BYTES, _MOST_ENTRIES = 8 << 20, 20_000
 _REMEDY = "remove it: everybody who reviews then gets a new link"
 
@@ -35,7 +35,7 @@ class _Entry(BaseModel):
 
 
 class _Content(BaseModel):
-    """Who may come in, by the SHA-256 of a link's token or a cookie's secret, of which nothing else is written down."""
+    """Valid links and sessions, stored only as SHA-256 digests of link tokens and cookie secrets."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -46,12 +46,12 @@ class _Content(BaseModel):
 
 @dataclass(frozen=True)
 class AccessFile:
-    """A file, for its owner's eyes alone, from which a server that starts again knows who was let in, and its port."""
+    """A file readable by its owner only, from which a restarted server restores sessions and port."""
 
     path: Path
 
     def read(self) -> dict[str, Any]:
-        """Return its content, empty where there is none; raises UsageError for what cannot be read."""
+        """Return the content, empty if the file is missing; raises UsageError for an invalid file."""
         if not os.path.lexists(self.path):
             return _Content().model_dump()
         said = read_json_object(
@@ -65,17 +65,17 @@ class AccessFile:
             raise UsageError(f"{self.path}: {where}: {first['msg']}; {_REMEDY}") from error
 
     def write(self, content: Mapping[str, Any]) -> None:
-        """Write it anew."""
+        """Replace the content."""
         with file_beside(self.path) as beside:
             os.close(os.open(beside, os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o600))
             beside.write_text(json.dumps(content))
 
 
 class Tokens:
-    """Who may come in. A person is any name.
+    """Valid links and sessions of persons, identified by any name.
 
-    With a file, links that nobody used and the secrets of those who used one are good for ``LASTING_S``, in another process
-    too; otherwise both end with this one.
+    With a file, unused links and session secrets stay valid for ``LASTING_S``, also in another process; otherwise both end with
+    this process.
     """
 
     def __init__(self, kept: AccessFile | None = None, now: Callable[[], float] = time.time):
@@ -88,17 +88,17 @@ class Tokens:
 
     @property
     def port(self) -> int | None:
-        """The port that a server had with them before."""
+        """The port of the previous server."""
         port: int | None = self._content["port"]
         return port
 
     def served_at(self, port: int) -> None:
-        """Note the port of this server: a cookie is good for no other."""
+        """Record the port of this server; cookies are specific to it."""
         self._content["port"] = port
         self._write()
 
     def forget(self) -> None:
-        """Let nobody in who was let in before."""
+        """Revoke all links and sessions."""
         self._content |= {"links": {}, "cookies": {}}
         self._write()
 
@@ -109,13 +109,13 @@ class Tokens:
         theirs = [digest for digest, entry in links.items() if entry["person"] == person]
         for digest in sorted(theirs, key=lambda each: links[each]["at"])[
             :-MOST_LINKS
-        ]:  # a stable order: as they were made
+        ]:  # stable sort: in order of creation
             del links[digest]
         self._write()
         return token
 
     def redeem(self, token: str) -> str | None:
-        """Return the secret of a person for the token of a link, which ends with it; None for one that is not valid."""
+        """Exchange a link's token for a session secret and invalidate the link; None for an invalid token."""
         found = self._find(token, "links")
         if found is None:
             return None
@@ -125,12 +125,12 @@ class Tokens:
         return secret
 
     def person(self, secret: str) -> str | None:
-        """Return who has this secret, or None."""
+        """Return the person with this session secret, or None."""
         found = self._find(secret, "cookies")
         return None if found is None else str(self._content["cookies"][found]["person"])
 
     def _find(self, given: str, kind: str) -> str | None:
-        """Return the known digest that a text has; each comparison takes as long, however much of it is right."""
+        """Return the stored digest of a token or secret; comparisons take constant time."""
         wanted, found = _digest(given), None
         for digest, entry in self._content[kind].items():
             if hmac.compare_digest(wanted, digest) and not self._is_over(entry):

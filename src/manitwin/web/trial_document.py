@@ -1,4 +1,4 @@
-"""What the 3D view plays of a grasp trial, as one JSON document: where hand and object are, state by state."""
+"""JSON document of a grasp trial for the 3D view: poses of hand and object over time."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _DECIMALS = 5
 
 
 def trial_bytes(folder: str, gripper: str, grasp_id: str) -> bytes:
-    """Try a grasp of the twin in a folder again and return its document as JSON; raises what ``replay_trial`` does."""
+    """Repeat a grasp trial of the twin in a folder and return its document as JSON; raises the errors of ``replay_trial``."""
     return document_bytes(trial_document(Twin(folder), gripper, grasp_id))
 
 
 def trial_document(twin: Twin, gripper: str, grasp_id: str) -> dict[str, Any]:
-    """Try a grasp again and return what is drawn of it: metres, quaternions wxyz, seconds.
+    """Repeat a grasp trial and return its document: metres, quaternions wxyz, seconds.
 
-    The frame is that of the object as the trial begins, +Z up. Poses are rows of position and quaternion, one a state, or one
-    in all where it never changes; those of ``boxes`` are in the hand's frame.
+    The frame is the object frame at the beginning of the trial, +Z up. Poses are rows of position and quaternion, one per state,
+    or a single row if constant; those of ``boxes`` are in the hand frame.
     """
     replayed = replay_trial(twin, gripper, grasp_id)
     recording, result = replayed.recording, replayed.recording.result
@@ -52,7 +52,7 @@ def trial_document(twin: Twin, gripper: str, grasp_id: str) -> dict[str, Any]:
 
 
 def phase_spans(recording: TrialRecording) -> list[dict[str, Any]]:
-    """Return the phases one after the other, each with the number of its first state."""
+    """Return the phases in order, each with the index of its first state."""
     return [
         {"label": phase, "first": next(states)[0]}
         for phase, states in groupby(enumerate(recording.phases), lambda each: each[1])
@@ -60,13 +60,15 @@ def phase_spans(recording: TrialRecording) -> list[dict[str, Any]]:
 
 
 def poses(matrices: np.ndarray) -> list[float]:
-    """Return poses ``(S, 4, 4)`` as rows of position and quaternion in one list; one row where all are equal as written."""
+    """Return poses ``(S, 4, 4)`` as rows of position and quaternion in a flat list; a single row if all are equal
+    after rounding.
+    """
     rows = np.hstack([matrices[:, :3, 3], quaternion_wxyz(matrices[:, :3, :3])]).round(_DECIMALS) + 0.0
     return [float(each) for each in (rows[:1] if (rows == rows[0]).all() else rows).ravel()]
 
 
 def _boxes(gripper: Gripper, joints: np.ndarray) -> list[dict[str, Any]]:
-    """Return the boxes of a hand and their poses in its frame at each state of its joints ``(S, J)``."""
+    """Return the boxes of a hand and their poses in its frame for each state of its joints ``(S, J)``."""
     placed = [_placed(gripper, row) for row in joints]
     return [
         {"half": [float(each) for each in half], "poses": poses(np.array([row[place][0] for row in placed]))}
@@ -79,7 +81,7 @@ def _placed(gripper: Gripper, state: np.ndarray) -> list[tuple[np.ndarray, np.nd
         return gripper.boxes_at(state)
     if not isinstance(gripper, ParallelGripper):
         return gripper.boxes(gripper.opening_m)
-    plus, minus = (gripper.boxes(2 * float(distance)) for distance in state)  # each finger has its own distance
+    plus, minus = (gripper.boxes(2 * float(distance)) for distance in state)  # each finger has its own joint position
     first_of_minus = len(gripper.palm_boxes) + len(gripper.finger_boxes)
     return [*plus[:first_of_minus], *minus[first_of_minus:]]
 

@@ -1,4 +1,4 @@
-"""Grasp trials for pages, tried in a process of their own: what physics makes of a broken twin ends that process alone."""
+"""Playback of grasp trials in a separate process, so that a broken twin can crash that process only."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.web.trial_document import trial_bytes
 
 MOST_KEPT = 64
-"""Documents of trials that were played, which are kept for the next look; one has some 100 kB."""
+"""Number of cached trial documents, about 100 kB each."""
 LONGEST_S = 60.0
-"""A trial takes a few tenths of a second, the start of the process some seconds; what takes this long is ended."""
+"""Timeout. A trial takes a few tenths of a second, starting the process a few seconds."""
 
 
 @dataclass(frozen=True)
 class _Refused:
-    """An error of the other process, in words: not every error can be sent from one to another."""
+    """An error of the other process as text, since not every exception can be pickled."""
 
     why: str
     usage: bool
@@ -34,13 +34,13 @@ def _tried(folder: str, gripper: str, grasp_id: str) -> bytes | _Refused:
         return trial_bytes(folder, gripper, grasp_id)
     except ManiTwinError as error:
         return _Refused(str(error), isinstance(error, UsageError))
-    except Exception as error:  # an altered twin: numbers that no engine takes, joints that the hand has not
+    except Exception as error:  # an altered twin: numbers that no engine accepts, joints that the hand lacks
         cause = printable_line(f"{type(error).__name__}: {error}", max_characters=200)
         return _Refused(f"{folder}: the trial cannot be run ({cause}); build the twin again", usage=False)
 
 
 class TrialPlayer:
-    """Plays one trial at a time. The process starts with the first, and ends with ``close`` or the ``with`` block."""
+    """Plays one trial at a time. The process starts with the first trial, and ends with ``close`` or the ``with`` block."""
 
     def __init__(self) -> None:
         self._pool: ProcessPoolExecutor | None = None
@@ -49,9 +49,9 @@ class TrialPlayer:
         self._kept: OrderedDict[tuple[str, str, str, str], bytes] = OrderedDict()
 
     def play(self, twin: Twin, gripper: str, grasp_id: str) -> bytes:
-        """Return the document of a trial as JSON; raises UsageError for a grasp that is not there or cannot be tried again.
+        """Return the document of a trial as JSON.
 
-        TwinError where the process ends, or takes too long.
+        Raises UsageError for a grasp that is unknown or cannot be repeated, and TwinError if the process crashes or times out.
         """
         key = (twin.record.twin_id, twin.record.revision, gripper, grasp_id)
         with self._lock:
@@ -78,7 +78,7 @@ class TrialPlayer:
             return document
 
     def close(self) -> None:
-        """End the process, and with it a trial that is under way."""
+        """Kill the process and any running trial."""
         self._closed = True
         self._end()
 
@@ -86,7 +86,7 @@ class TrialPlayer:
         pool, self._pool = self._pool, None
         if pool is None:
             return
-        running = list((pool._processes or {}).values())  # one that hangs must not keep the server from its end
+        running = list((pool._processes or {}).values())  # a hanging process must not block the shutdown
         pool.shutdown(wait=False, cancel_futures=True)
         for process in running:
             process.kill()

@@ -1,4 +1,4 @@
-"""What the 3D view draws of a twin, as one JSON document: points, hulls, grasps and placements, in the object frame."""
+"""JSON document of a twin for the 3D view: points, hulls, grasps and placements in the object frame."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ from manitwin.web.gripper_shapes import gripper_shape
 
 DOCUMENT = "viewer.json"
 MOST_GRASPS = 1_000
-"""Of each gripper; a twin has about a hundred. More say nothing to a person, and cost the browser's frames."""
+"""Maximum number of grasps per gripper; a twin has about a hundred. More are not informative and slow the browser down."""
 MOST_ROWS = 20_000
-"""Of the table that are looked at."""
+"""Maximum number of rows read from the grasp table."""
 _DECIMALS_M, _DECIMALS = 5, 5
 _ROD_SHARE, _ROD_M = 0.012, (0.0012, 0.004)
 
 
 def twin_document(twin: Twin) -> dict[str, Any]:
-    """Return the document; what cannot be read of a twin stands in ``unreadable``, a line each, and the rest is there.
+    """Return the document. Unreadable parts of the twin are listed in ``unreadable``; the rest is included.
 
-    Lengths in metres, quaternions wxyz. ``grasps[gripper]`` has columns in an order in which the first n lie far from each other.
+    Lengths in metres, quaternions wxyz. The columns of ``grasps[gripper]`` are ordered so that the first n are far from each
+    other.
     """
     record, unreadable = twin.record, []
     document: dict[str, Any] = {"twin_id": record.twin_id, "model": None, "grasps": {}, "grippers": {}, "hulls": []}
@@ -60,7 +61,7 @@ def twin_document(twin: Twin) -> dict[str, Any]:
 
 
 def document_bytes(document: dict[str, Any]) -> bytes:
-    """Return the document as JSON in ASCII; equal documents give equal bytes."""
+    """Return a document as ASCII JSON; equal documents give equal bytes."""
     return json.dumps(document, allow_nan=False, separators=(",", ":"), sort_keys=True).encode()
 
 
@@ -95,7 +96,7 @@ def _point(kind: str, name: str, position: list[float], normal: list[float], lab
 
 
 def _grasps(twin: Twin, longest_m: float) -> dict[str, Any]:
-    """Return grasps and shapes of all grippers; the unfiltered sample and the jittered controls are left out."""
+    """Return grasps and drawings of all grippers, without the unfiltered sample and the jittered controls."""
     table = twin.grasp_table().slice(0, MOST_ROWS).to_pydict()
     keep: dict[str, list[int]] = {}
     for row, (gripper, proposer) in enumerate(zip(table["gripper"], table["proposer"], strict=True)):
@@ -128,7 +129,7 @@ def _grasps(twin: Twin, longest_m: float) -> dict[str, Any]:
 
 
 def _far_apart(poses: np.ndarray, depths: np.ndarray) -> list[int]:
-    """Return the order of grasps, each the farthest from those before it; of all but one, as of all no order is made."""
+    """Return the grasps in farthest-first order."""
     first = [int(i) for i in farthest_grasps(poses, depths, min(len(poses) - 1, MOST_GRASPS))] if len(poses) > 1 else []
     last = [i for i in range(len(poses)) if i not in set(first)]
     return (first + last)[:MOST_GRASPS]

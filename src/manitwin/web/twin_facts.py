@@ -1,4 +1,4 @@
-"""Tables of a twin: every number with its interval, and who says so."""
+"""HTML tables of a twin's record: every number with its interval and source."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _HEADS = ("", "value", "interval", "source")
 
 
 def fact_tables(record: TwinRecord) -> str:
-    """Return the tables of an accepted twin, one after the other."""
+    """Return all tables of an accepted twin."""
     parts = []
     if record.physical is not None:
         parts.append(_physical(record.physical, record.provenance.stages.keys()))
@@ -38,7 +38,7 @@ def _estimate(name: str, estimate: Estimate, unit: str) -> tuple[Any, ...]:
 
 
 def _filled(physical: Physical) -> list[tuple[Any, ...]]:
-    """Return a row of each state of a closed vessel but the full one, which the twin is."""
+    """Return a row for each filling state of a closed vessel except the full state, which the twin represents."""
     if physical.filling is None:
         return []
     return [
@@ -59,7 +59,7 @@ def _spread(uncertainty_m: float | None) -> str | None:
 def _physical(physical: Physical, stages: Any) -> str:
     along = [f"{number(100 * each)}" for each in physical.extents_m]
     box = [f"{number(100 * each)}" for each in physical.obb.extents_m]
-    com = ", ".join(f"{round(1000 * each, 2) + 0.0:.2f}" for each in physical.center_of_mass_m)  # no -0.00
+    com = ", ".join(f"{round(1000 * each, 2) + 0.0:.2f}" for each in physical.center_of_mass_m)  # avoids -0.00
     weighed = f"computed: a {physical.mass_distribution} of even density"
     if physical.mass_distribution == "parts":
         weighed = "computed: parts of different density"
@@ -168,7 +168,7 @@ def _placements(record: TwinRecord) -> str:
 
 
 def _moving(record: TwinRecord) -> str:
-    """Return the links and joints of what moves in itself; nothing of all others."""
+    """Return the tables of links and joints of an articulated twin; empty for others."""
     if not record.links:
         return ""
     links = [(link.name, f"{number(link.mass_kg)} kg", len(link.hulls), link.source) for link in record.links]
@@ -225,7 +225,7 @@ def _checks(record: TwinRecord) -> str:
 
 
 def provenance(record: TwinRecord) -> str:
-    """Return the tables of where a twin comes from: its source, and who did each stage."""
+    """Return the tables of a twin's source and of the backend of each stage."""
     source = record.source
     origin = [
         ("kind", source.kind), ("file", source.file), ("words", source.prompt), ("licence", source.license),

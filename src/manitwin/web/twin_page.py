@@ -1,4 +1,4 @@
-"""A twin's page as HTML: the 3D view, every number with its interval and source, and every picture the model was shown."""
+"""HTML page of a twin: 3D view, all numbers with interval and source, and all pictures that the model was shown."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ LAYERS = (
     ("cube", "B", "10 cm cube", True),
     ("gripper", "R", "Gripper beside it", False),
 )
-"""What the 3D view can show: name, key, words, and whether it does at first."""
+"""Layers of the 3D view: name, key, label, and whether initially visible."""
 KEYS = (
     ("← → ↑ ↓", "turn"), ("+ −", "nearer, farther"), ("0", "from the front again"), ("[ ]", "fewer, more grasps"),
     ("N  Shift N", "next, previous grasp: the whole hand"), ("T  Shift T", "play or pause its trial, close it"),
     ("L", "next placement"), ("K", "colours of grasps"),
 )  # fmt: skip
 SCRIPTS = (THREE, STAGE, TWIN_SHAPES, TRIAL_PLAYER, VIEWER)
-"""Of the 3D view of a twin, in the order in which they are run."""
+"""Scripts of the 3D view of a twin, in execution order."""
 SPEEDS = (("0.1", "⅒ ×"), ("0.25", "¼ ×"), ("0.5", "½ ×"), ("1", "1 ×"), ("2", "2 ×"))
 DATA_SCRIPT, MODEL_SCRIPT, TRIALS_SCRIPT = "viewer.js", "visual.glb.js", "trials.js"
-"""Of plain files: a browser reads no JSON and no GLB from a file's address, but scripts."""
+"""Data scripts of static files, since browsers load scripts from file URLs but neither JSON nor GLB."""
 
 
 def twin_page(twin: Twin, links: Links, *, with_gallery: bool = True, with_trials: bool = True) -> str:
-    """Return the page of a twin, accepted or rejected; ``with_trials``: those of its grasps can be played."""
+    """Return the page of an accepted or rejected twin; ``with_trials`` adds the playback of grasp trials."""
     record = twin.record
     name = record.name or (record.language.category if record.language else None) or record.twin_id
     back = f'<nav><a href="{text(links.gallery())}">All twins</a></nav>' if with_gallery else ""
@@ -60,7 +60,7 @@ def twin_page(twin: Twin, links: Links, *, with_gallery: bool = True, with_trial
 
 
 def viewer(record: TwinRecord, links: Links, *, with_trials: bool = True, hidden: Collection[str] = ()) -> str:
-    """Return the 3D view with its controls; ``hidden`` are layers that are not shown at first."""
+    """Return the 3D view with its controls; ``hidden`` layers are initially invisible."""
     layers = "".join(
         f'<label><input type="checkbox" data-layer="{name}"{" checked" if shown and name not in hidden else ""}>'
         f" {words} <kbd>{key}</kbd></label>"
@@ -129,7 +129,7 @@ def _downloads(record: TwinRecord, links: Links) -> str:
 
 
 def pictures(twin: Twin, links: Links, *, with_card: bool = True) -> str:
-    """Return every picture that the model was shown, and the card, which also has numbers with their intervals."""
+    """Return the card and every picture that the model was shown; ``with_card`` False omits the card, which shows intervals."""
     record = twin.record
     shown = [("card", CARD, "card")] if with_card and CARD in record.files else []
     if links.live and record.source.file in INPUTS:

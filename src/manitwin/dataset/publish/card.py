@@ -103,10 +103,7 @@ def front_matter(
 ) -> list[str]:
     """Return the lines of a card's YAML front matter. ``configs`` maps table names to paths; the first is the default."""
     fields = {"pretty_name": name, **hub_license(licences)}
-    lines = [
-        "---",
-        *(f"{key}: {json.dumps(value)}" for key, value in fields.items()),
-    ]  # a JSON string is a valid YAML string
+    lines = ["---", *(f"{key}: {json.dumps(value)}" for key, value in fields.items())]  # JSON strings are valid YAML
     lines += ["size_categories:", f"- {json.dumps(size_category(rows))}"]
     lines += ["task_categories:", "- robotics", "tags:", *[f"- {each}" for each in tags], "configs:"]
     for number, (config, path) in enumerate(configs.items()):

@@ -95,9 +95,7 @@ class FakeHunyuan3d:
         return Response(200, mesh_file("glb", self.faults, number), {"Content-Type": "application/octet-stream"})
 
     def _crashes(self, body: dict[str, Any]) -> bool:
-        if picture_base64(
-            body.get("image")
-        ):  # also for a text-only request: the server does not load the text pipeline
+        if picture_base64(body.get("image")):  # also for a text alone: the text pipeline is not loaded
             return True
         return self.version == "2.0" and bool(body.get("texture")) and not self.enable_tex
 

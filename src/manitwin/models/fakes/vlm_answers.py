@@ -30,12 +30,7 @@ _BOX = re.compile(r"as it stands, has 1 : ([\d.]+) : ([\d.]+)")
 _DENSITY = re.compile(r"is ([\d.e+-]+) kg/m3, but a thing of .* has ([\d.e+-]+) to ([\d.e+-]+) kg/m3")
 _ASKED_FOR = re.compile(r"somebody asks for (['\"])(.+?)\1\.(?:\s|$)")
 _TOO_WIDE = re.compile(r"marker (\d+), .*fingers")
-_ONE_MATTER = (
-    "food skin",
-    "foam",
-    "wax",
-    "wood",
-)  # surfaces of solid homogeneous objects, rather than of containers with contents
+_ONE_MATTER = ("food skin", "foam", "wax", "wood")  # surfaces of solid objects, not of containers with contents
 _USUAL_WALL_M = 0.003
 
 
