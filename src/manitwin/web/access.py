@@ -107,9 +107,7 @@ class Guard:
 
     def __init__(self, app: ASGIApp, names: Names, tokens: Tokens, used_link: Callable[[], None] | None = None):
         self.app, self.names, self.tokens = app, names, tokens
-        self.cookie = (
-            f"manitwin_{names.port}"  # cookies ignore ports: servers on one host must not overwrite each other's cookie
-        )
+        self.cookie = f"manitwin_{names.port}"  # cookies ignore ports: servers must not share one
         self._used_link = used_link
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -150,9 +148,7 @@ class Guard:
     async def _enter(self, scope: Scope, send: Send) -> None:
         asked = parse_qs(scope["query_string"].decode("latin-1"))
         token, onward = asked.get("token", [""])[0], asked.get("next", ["/"])[0]
-        secret = (
-            self.tokens.redeem(token) if scope["method"] == "GET" else None
-        )  # HEAD, as sent by link previews, does not use the link up
+        secret = self.tokens.redeem(token) if scope["method"] == "GET" else None  # a preview (HEAD) keeps the link
         if secret is None:
             if self._used_link is not None:
                 self._used_link()

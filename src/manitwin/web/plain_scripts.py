@@ -42,7 +42,8 @@ def write_twin(
     """Write the page of a twin with its files, all or none; return their total bytes.
 
     With a ``player``, the trials of the first ``trials`` grasps of each gripper, which are far apart, can be played. Raises
-    TwinError for a twin that cannot be read completely, since the error messages of partial pages name local folders.
+    TwinError for a twin that cannot be read completely: static pages must be complete, and must not name local folders in error
+    messages.
     """
     document = twin_document.twin_document(twin)
     if document["unreadable"]:

@@ -1,1 +1,1 @@
-"""The built-in generator of things that can be described by a few measures: see ``template``."""
+"""Built-in parametric generator: objects described by a few measures. See ``template``."""

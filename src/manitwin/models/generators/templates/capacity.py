@@ -1,4 +1,4 @@
-"""The volume that a made thing holds, and the scale at which it has a stated volume or mass."""
+"""Capacity of a generated container, and the scale at which an object has a stated volume or mass."""
 
 from __future__ import annotations
 
@@ -13,22 +13,23 @@ from manitwin.models.generators.templates.made import Made
 from manitwin.models.generators.templates.stated_amounts import Amount
 
 CLOSED_WALLS_M = {"glass": 0.003, "plastic": 0.0005, "aluminium": 0.0001, "steel": 0.0003, "cardboard": 0.0005}
-"""How thick the walls of closed containers are, by their surface: bottles and jars of glass 2 to 4 mm, PET 0.3 to 0.7, cans 0.1
-to 0.3, drink cartons and composite cans 0.4 to 0.9."""
+"""Wall thickness of closed containers by surface material: glass bottles and jars 2 to 4 mm, PET 0.3 to 0.7, cans 0.1 to 0.3,
+drink cartons and composite cans 0.4 to 0.9.
+"""
 TWO_WALLS_M = 0.005
-"""How thick the wall of a thermos is: two sheets of steel and the gap between them."""
+"""Wall thickness of a thermos: two steel sheets and the gap between them."""
 LEVELS = 200
-"""Level sections that the volume of a hollow is summed over."""
+"""Number of horizontal sections over which the volume of a cavity is summed."""
 MOST_ROUNDS, CLOSE = 8, 0.005
-"""Steps of the search for a scale, and the relative error at which it ends."""
+"""Maximum number of iterations of the scale search, and the relative error at which it stops."""
 LEAST, MOST = 1e-9, 1e3
-"""No thing that a hand holds has a volume (m^3) or a mass (kg) outside of these: no scale is sought for one."""
+"""Bounds on volume (m^3) and mass (kg); no scale is searched for values outside."""
 
 
 def capacity_m3(made: Made) -> float | None:
-    """Return the volume that a thing holds: up to the lowest place of its rim, or within its walls where it is closed.
+    """Return the capacity of an object: the volume below the lowest point of its rim, or inside the walls of a closed container.
 
-    None for what is no container, and for one without a hollow.
+    None for an object that is no container, and for a container without a cavity.
     """
     prior = load_priors()[made.category]
     if prior.vessel:
@@ -44,7 +45,7 @@ def capacity_m3(made: Made) -> float | None:
 
 
 def held_m3(made: Made, amount: Amount) -> float:
-    """Return ``capacity_m3`` of a thing whose volume is stated as an ``amount``; raises UsageError for what holds nothing."""
+    """Return ``capacity_m3`` of an object whose volume is stated as an ``amount``; raises UsageError if it is no container."""
     held = capacity_m3(made)
     if held is None:
         raise UsageError(
@@ -54,7 +55,7 @@ def held_m3(made: Made, amount: Amount) -> float:
 
 
 def _closed_wall_m(made: Made) -> float:
-    """Return how thick (m) the wall of a closed container is; raises UsageError where that is not known of its material."""
+    """Return the wall thickness (m) of a closed container; raises UsageError if it is unknown for its material."""
     if made.category == "thermos":
         return TWO_WALLS_M
     surface = made.looks["body"].surface
@@ -68,22 +69,24 @@ def _closed_wall_m(made: Made) -> float:
 
 
 def _hollow_m2(section: CrossSection) -> float:
-    """Return the area (m^2) of the largest hole in a level section, 0 where the wall around is interrupted, as at a spout."""
+    """Return the area (m^2) of the largest hole in a horizontal section; 0 if the wall around it is interrupted, as
+    at a spout.
+    """
     holes = [-area for loop in section.to_polygons() if (area := _area_m2(loop)) < 0]
     return max(holes, default=0.0)
 
 
 def _area_m2(loop: np.ndarray) -> float:
-    """Return the area (m^2) of a closed loop ``(N, 2)`` m, negative where it runs clockwise, as around a hole."""
+    """Return the signed area (m^2) of a closed loop ``(N, 2)`` in metres, negative if clockwise, as around a hole."""
     x, y = loop.T
     return 0.5 * float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
 
 
 def scale_with(amount: Amount, made_at: Callable[[float], Made]) -> float:
-    """Return the scale at which the thing of ``made_at(scale)`` has a stated volume or mass.
+    """Return the scale at which the object of ``made_at(scale)`` has a stated volume or mass.
 
-    It is sought in steps, as walls and sheets keep their thickness. Raises UsageError for a volume of what holds nothing, and
-    for an amount that no scale gives.
+    The search is iterative, since walls and sheets keep their thickness. Raises UsageError for a volume of an object that is no
+    container, and for an amount that no scale gives.
     """
     scale, wanted = 1.0, amount.mass_kg if amount.volume_m3 is None else amount.volume_m3
     for _ in range(MOST_ROUNDS):

@@ -1,4 +1,4 @@
-"""What the words around a thing's name say of it: colours, materials, relative size; 'small', 'dark blue', 'stainless steel'."""
+"""Colours, materials and relative sizes in the words around an object's name: 'small', 'dark blue', 'stainless steel'."""
 
 from __future__ import annotations
 
@@ -36,29 +36,29 @@ from manitwin.models.generators.templates.vocabulary import (
 
 _GOLDEN = frozenset({"brass", "bronze", "copper"})
 _NO_COLOR_BEFORE = frozenset({"resistant", "proof", "free", "remover", "removal"})
-"""Behind a colour's word, which then is none: rust resistant."""
+"""After these words, a colour word is no colour: rust resistant."""
 _COLORED = frozenset({"colored", "coloured", "color", "colour", "painted"})
 _PLAIN = frozenset(
     {"ceramic", "plastic", "wood", "steel", "stainless steel", "rubber", "glass", "paper", "stone", "fabric"}
 )
-"""Materials that another word makes more exact: a wooden oak spoon is of oak."""
+"""Generic materials that a second word can specify: a wooden oak spoon is made of oak."""
 
 
 @dataclass(frozen=True)
 class Wish:
-    """A colour or a material, or both, that a text names; ``kind`` is the colour's word where it speaks of the matter too."""
+    """A requested colour or material, or both. ``kind`` is the colour word if it also implies a material."""
 
     rgb: tuple[float, float, float] | None = None
     material: Look | None = None
     kind: str = ""
 
     def of(self, look: Look) -> Look:
-        """Return a look with what is wished for, the rest as it is."""
+        """Return a look with the requested properties applied."""
         matter = look if self.material is None or self.material.material == look.material else self.material
         return matter if self.rgb is None else matter.colored(self.rgb)
 
     def over(self, other: Wish) -> Wish:
-        """Return this with what another one wishes besides."""
+        """Return this wish completed by another one."""
         return Wish(
             other.rgb if self.rgb is None else self.rgb,
             other.material if self.material is None else self.material,
@@ -66,7 +66,7 @@ class Wish:
         )
 
     def choices(self, usual: Sequence[Look]) -> list[Look]:
-        """Return the looks to draw from, of the ``usual`` ones of a part: what is not wished for is drawn."""
+        """Return the looks to sample from, given the ``usual`` looks of a part; unspecified properties are sampled."""
         if self.material is not None:
             return [self.material] if self.rgb is not None else usual_looks(self.material, usual)
         if self.kind in METAL_COLORS:
@@ -83,7 +83,7 @@ class Wish:
 
 @dataclass(frozen=True)
 class Described:
-    """What words say: a colour and a material, the relative size (None: not said), and the words that say nothing."""
+    """Meaning of some words: colour and material, relative size (None if not stated), and words without meaning to a template."""
 
     wish: Wish = Wish()
     relative: float | None = None
@@ -92,7 +92,7 @@ class Described:
 
 @dataclass(frozen=True)
 class _Said:
-    """A colour or a material of a phrase of words ``start`` to ``end``."""
+    """A colour or material expressed by the words ``start`` to ``end``."""
 
     start: int
     end: int
@@ -103,10 +103,10 @@ class _Said:
 
 
 def described(words: Sequence[str], of: Prior | None = None) -> Described:
-    """Return what words say; those before the name of a thing ``of`` a prior may say what it is for instead.
+    """Return the meaning of words. ``of`` is the prior of the object if they precede its name, where they may state its purpose.
 
-    A word that is both a colour and a material (copper) is the latter where no other is said. Raises UsageError for two colours,
-    two materials or two sizes of one thing.
+    A word that is both a colour and a material (copper) means the material if no other is stated. Raises UsageError for two
+    colours, two materials or contradicting sizes.
     """
     said, unused = _read(words, of)
     sizes = [word for word in unused if word in RELATIVE]
@@ -121,17 +121,17 @@ def described(words: Sequence[str], of: Prior | None = None) -> Described:
 
 
 def _shade_of(said: Sequence[_Said], look: Look | None, words: Sequence[str]) -> tuple[float, float, float] | None:
-    """Return the colour of a material that a shade is said of ('dark wood'), None where none is."""
+    """Return the colour of a material with a shade ('dark wood'); None without a shade."""
     shades = [words[each.start - 1] for each in said if each.start and each.material is not None]
     shade = next((word for word in shades if SHADES.get(word)), None)
     return None if look is None or shade is None else shaded(look.rgb, shade)
 
 
 def materials_said(before: Sequence[str], called: Sequence[str], tail: Sequence[str], of: Prior) -> list[Look]:
-    """Return the materials that the words around and in what a thing is called say, whatever colours they say.
+    """Return the materials stated around and in an object's name, whatever the colours.
 
-    What it is called says one of several that such things are of (a paper cup, but no paper towel), or another one where it is
-    no plain name (a plastic jar). Raises UsageError for two of one kind of words.
+    A material in the name counts if it is one of several usual ones (paper cup, but not paper towel), or an unusual one in a name
+    that is not the category itself (plastic jar). Raises UsageError for two materials in one group of words.
     """
     named = [
         each
@@ -143,13 +143,13 @@ def materials_said(before: Sequence[str], called: Sequence[str], tail: Sequence[
 
 
 def own_materials(called: Sequence[str], of: Prior) -> list[str]:
-    """Return the words of what a thing is called that say what it is of."""
+    """Return the words of an object's name that state its material."""
     found = [each for each in _read(called, of)[0] if _is_said(each.material, each.end, called, of)]
     return [word for each in found for word in called[each.start : each.end]]
 
 
 def _is_said(look: Look | None, end: int, called: Sequence[str], of: Prior) -> bool:
-    """Tell whether a material in what a thing is called, before word ``end``, says what this one is of."""
+    """Return whether a material in an object's name, ending before word ``end``, states the material of this object."""
     if look is None or end == len(called) or is_composite(of):
         return False
     usual = surfaces_of(of)
@@ -159,7 +159,7 @@ def _is_said(look: Look | None, end: int, called: Sequence[str], of: Prior) -> b
 
 
 def _read(words: Sequence[str], of: Prior | None) -> tuple[list[_Said], list[str]]:
-    """Return the colours and materials that words say, and the words that say neither."""
+    """Return the colours and materials in some words, and the words that express neither."""
     said, left = list[_Said](), list[str]()
     at = 0
     while at < len(words):
@@ -175,7 +175,7 @@ def _read(words: Sequence[str], of: Prior | None) -> tuple[list[_Said], list[str
 
 
 def described_behind(words: Sequence[str]) -> Described:
-    """Return what the words behind a name say of it: the red of 'a mug in red', nothing of 'a glass of red wine'.
+    """Return the meaning of the words after a name: red for 'a mug in red', nothing for 'a glass of red wine'.
 
     Raises UsageError as ``described`` does.
     """
@@ -185,7 +185,7 @@ def described_behind(words: Sequence[str]) -> Described:
 
 
 def _about(words: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the words behind a name that speak of it, and those that speak of what is in it, or what it is for."""
+    """Return the words after a name that describe it, and those that describe its contents or purpose."""
     cut = next((at for at, word in enumerate(words) if speaks_of_others(words, at)), len(words))
     about, beside = list(words[:cut]), [word for word in words[cut:] if word not in FILLER_WORDS | PURPOSE | PLACES]
     telling = [word for word in about if word not in FILLER_WORDS]
@@ -197,19 +197,19 @@ def _about(words: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def more_exact(one: Look, other: Look) -> Look | None:
-    """Return the more exact of two names of one material: oak, of wood and oak; None for two materials."""
+    """Return the more specific of two names of one material (oak, of wood and oak); None for two different materials."""
     if one == other or (one.surface == other.surface and other.material in _PLAIN):
         return one
     return other if one.surface == other.surface and one.material in _PLAIN else None
 
 
 def is_described(word: str) -> bool:
-    """Tell whether a word says a colour, a material, or a relative size."""
+    """Return whether a word expresses a colour, a material, a shade or a relative size."""
     return color_of(word) is not None or material_of(word) is not None or word in RELATIVE or word in SHADES
 
 
 def _found(words: Sequence[str], at: int, of: Prior | None) -> _Said | None:
-    """Return the colour or material that begins at a word, the longest phrase first."""
+    """Return the colour or material that starts at a word, trying the longest phrase first."""
     for length in (3, 2, 1):
         end = at + length
         phrase = " ".join(words[at:end])
@@ -231,10 +231,10 @@ def _found(words: Sequence[str], at: int, of: Prior | None) -> _Said | None:
 
 
 def _color(said: Sequence[_Said], words: Sequence[str]) -> _Said | None:
-    """Return the colour of phrases: of neighbours the more exact one, or their mean."""
+    """Return the combined colour of adjacent colour phrases: the more specific one, or their mean."""
     pure = [each for each in said if each.rgb is not None and each.material is None]
     if not pure and sum(each.material is not None for each in said) > 1:
-        pure = [each for each in said if each.rgb is not None]  # copper ceramic: the colour of copper
+        pure = [each for each in said if each.rgb is not None]  # copper ceramic: copper is the colour
     if not pure:
         return None
     color, end = pure[0], pure[0].end
@@ -247,7 +247,7 @@ def _color(said: Sequence[_Said], words: Sequence[str]) -> _Said | None:
                 f"two colours for one object, {first} and {second}: state which part has which, such as"
                 f" 'a {first} mug with a {second} handle'"
             )
-        if CLEAR in (color.kind, each.kind):  # transparent blue is a blue that is seen through
+        if CLEAR in (color.kind, each.kind):  # transparent blue: clear with a blue tint
             hue = each if color.kind == CLEAR else color
             color = _Said(color.start, each.end, hue.rgb, None, hue.basic, CLEAR)
         elif each.basic and color.basic:
@@ -260,7 +260,7 @@ def _color(said: Sequence[_Said], words: Sequence[str]) -> _Said | None:
 
 
 def _material(said: Sequence[_Said]) -> Look | None:
-    """Return the material of phrases, the more exact one of two names of the same."""
+    """Return the stated material; of two names of the same material, the more specific one."""
     named = [each for each in said if each.material is not None]
     sure = [each for each in named if each.rgb is None] or named
     looks = list(dict.fromkeys(each.material for each in sure if each.material is not None))

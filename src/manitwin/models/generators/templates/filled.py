@@ -1,4 +1,4 @@
-"""What somebody says of a template's thing: its category, some of its measures, and colours and materials of its parts."""
+"""A template with specified values: category, measures, and colours and materials of parts."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")
 
 @dataclass(frozen=True)
 class Filled:
-    """A template's category with the measures that are said of it (metres and ratios) and wishes by part or slot.
+    """A template's category with specified measures (metres and ratios), and wishes by part or slot.
 
-    Measures that are not here are drawn or fitted as usual.
+    Measures that are not specified are sampled or fitted as usual.
     """
 
     category: str
@@ -40,11 +40,11 @@ class Filled:
         return load_templates()[self.category]
 
     def corrected(self, other: Filled) -> Filled:
-        """Return this with what another one says besides or instead."""
+        """Return this with the values of another one added or replaced."""
         return replace(self, measures={**self.measures, **other.measures}, wishes=_joined(self.wishes, other.wishes))
 
     def why_no_solid(self) -> str | None:
-        """Return why the measures, usual ones beside them, give no solid; None where they do."""
+        """Return why the measures, completed by typical values, give no solid; None if they do."""
         try:
             self.template.build(**self.template.typical() | dict(self.measures)).assembly.mesh()
         except SolidError as error:
@@ -53,13 +53,15 @@ class Filled:
 
 
 def parts_of(template: Template) -> list[str]:
-    """Return what colours and materials may be said of: the slots of a template, and the parts of the usual thing."""
+    """Return the names to which colours and materials can be assigned: the template's slots, and the parts of the
+    typical object.
+    """
     names = template.build(**template.typical()).assembly.mesh().names
     return list(dict.fromkeys([*template.slots, *names]))
 
 
 def color_said(text: str) -> tuple[float, float, float] | None:
-    """Return the sRGB colour of a word (blue), of two (dark blue) or of #rrggbb; None where it is none."""
+    """Return the sRGB colour of a word (blue), of two (dark blue) or of #rrggbb; None if it is no colour."""
     found = _HEX.fullmatch(text.strip())
     if found is not None:
         red, green, blue = (int(found[channel], 16) / 255 for channel in (1, 2, 3))
@@ -75,7 +77,7 @@ def color_said(text: str) -> tuple[float, float, float] | None:
 
 
 def dressed_as(fitted: Fitted, wishes: Mapping[str, Wish]) -> Fitted:
-    """Return a fitted thing with other looks: those of parts that a photo does not show."""
+    """Return a fitted object with other looks, for parts that a photo does not show."""
     made, template = fitted.made, load_templates()[fitted.category]
     first, model = next(iter(template.slots)), template.build(**template.typical())
     looks = dict(made.looks)
@@ -88,9 +90,9 @@ def dressed_as(fitted: Fitted, wishes: Mapping[str, Wish]) -> Fitted:
 
 
 def make_filled(filled: Filled, text: str, rng: np.random.Generator) -> Made:
-    """Make what a text asks for, as it was filled in; what the text says in plain words and lengths comes first.
+    """Make the object of a text with specified values; colours, materials and lengths stated in the text take precedence.
 
-    Raises UsageError for a size that no such thing has, SolidError for measures that give no solid.
+    Raises UsageError for an impossible size, and SolidError for measures that give no solid.
     """
     lengths = lengths_in(text)
     wanted = Wanted(filled.category, filled.wishes, lengths)

@@ -1,4 +1,4 @@
-"""What a template knows of the thing that it made, as an import record: name, mass properties, material and points."""
+"""Ground-truth annotations of a generated object as an import record: name, mass properties, material and points."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from manitwin.models.generators.templates.template import IN_THE_OPEN, KnownPoin
 from manitwin.twin.import_record import GivenPoint, ImportRecord
 
 MOST_POINTS = 4
-"""As many functional points as an object has (paper)."""
+"""Maximum number of functional points of an object (paper)."""
 _HEAVY_KG_M3, _HEAVIER = 3000.0, 1.5
-"""A part of a lighter material that weighs so much per volume, and so many times its material, has a core of iron."""
-_TELLING_SHARE = 0.25  # of mass and surface together: less of a material is not what a thing is said to be made of
+"""A part has an iron core if its density exceeds both this value and this multiple of its surface material's density."""
+_TELLING_SHARE = 0.25  # minimum share of mass and surface (mean) of a material that is named
 
 
 def known_of(made: Made, text: str) -> ImportRecord:
-    """Return the record of a thing, in its object frame.
+    """Return the import record of an object in its object frame.
 
-    The mass is that of its parts' volumes and densities, of whatever is closed in with its contents; centre and inertia are
-    summed over the parts (parallel axis theorem).
+    The mass follows from the volumes and densities of the parts, including contents for closed containers. Centre of mass and
+    inertia are summed over the parts (parallel axis theorem).
     """
     mass_kg, center, inertia = mass_properties(made.solids)
     return ImportRecord(
@@ -49,7 +49,7 @@ def known_of(made: Made, text: str) -> ImportRecord:
                 position_m=_on_surface(made, point).tolist(),
                 normal=list(point.direction),
                 label=point.label,
-                # a mere place has what geometry finds there: a handle its axis
+                # A "surface" point gets its frame from geometry, such as the axis of a handle.
                 frame=None if point.kind == "surface" else known_frame(made, point, center),
             )
             for point in made.points[:MOST_POINTS]
@@ -64,7 +64,7 @@ def known_of(made: Made, text: str) -> ImportRecord:
 
 
 def _called(category: str, text: str) -> str:
-    """Return what a text calls a thing of a category, where the priors have it as a name of the same or of one of its form."""
+    """Return the object's name in a text if the priors list it for this category or a kin of equal shape; else the category."""
     found = found_by(text)
     if found is None or category not in (found[0].category, found[0].kin_of):
         return category
@@ -72,9 +72,9 @@ def _called(category: str, text: str) -> str:
 
 
 def material_words(made: Made) -> str:
-    """Say what a thing is made of: one or two materials by their shares of mass and surface, 'steel and wood'.
+    """Return the one or two main materials by their shares of mass and surface, such as 'steel and wood'.
 
-    What weighs as metal does under a coat is of iron, and its surface of the coat: 'iron and rubber'.
+    A coated part with the density of metal counts as iron inside and as its coating on the surface: 'iron and rubber'.
     """
     shares: dict[str, float] = {}
     total_kg = sum(made.masses_kg.values())
@@ -96,7 +96,9 @@ def material_words(made: Made) -> str:
 
 
 def _on_surface(made: Made, point: KnownPoint) -> np.ndarray:
-    """Return a point's place; of an opening, hole or axis, which are in the open, the nearest place of its part, towards -Y."""
+    """Return the position of a point on the surface; for openings, holes and axes the nearest face centre of the part, towards
+    -Y.
+    """
     position = np.array(point.position_m)
     if point.kind not in IN_THE_OPEN:
         return position
@@ -106,7 +108,7 @@ def _on_surface(made: Made, point: KnownPoint) -> np.ndarray:
 
 
 def mass_properties(solids: list[tuple[Manifold, float]]) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return mass (kg), centre of mass ``(3,)`` m and inertia ``(3, 3)`` kg m^2 about it of solids of given densities."""
+    """Return mass (kg), centre of mass ``(3,)`` m and inertia ``(3, 3)`` kg m^2 about it, of solids with given densities."""
     pieces = []
     for solid, density in solids:
         mesh = solid.to_mesh()

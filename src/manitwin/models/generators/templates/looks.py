@@ -1,8 +1,8 @@
-"""Colours and materials by the words that people use, as PBR materials and densities.
+"""Colours and materials by everyday words, as PBR materials and densities.
 
 Colour words follow ISCC-NBS (Kelly and Judd 1955, level 2); the shades are typical of dyed and painted goods. Roughness and
-metalness are typical values of physically based material libraries. Densities are those of ``prior_tables/materials.toml``,
-a solid block of the material.
+metalness are typical values of physically based material libraries. Densities are those of solid material as in
+``prior_tables/materials.toml``.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ COLORS: dict[str, str] = {
     "mauve": "b08ea2", "fuchsia": "b8287f", "plum": "5e2f52", "salmon": "f08c7a", "taupe": "8b7d6f", "graphite": "4b4d50",
     "azure": "4a90d9", "aquamarine": "7fd4bd", "chartreuse": "b5cc3a", "ochre": "c28a2e", "umber": "5f4636",
 }  # fmt: skip
-"""sRGB by word, or by two."""
+"""sRGB by one or two words."""
 BASIC_COLORS = frozenset(
     ("white", "black", "grey", "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown", "beige")
 )
-"""The hues that another word makes more exact: olive green is olive."""
+"""Hues that a second word can specify: olive green is olive."""
 CLEAR = "clear"
 BARE_METALS = frozenset(("stainless steel", "chrome", "brass", "copper", "bronze"))
-"""What nobody paints: a green watering can is of sheet steel or plastic."""
+"""Metals that are not painted: a green watering can is made of sheet steel or plastic."""
 METAL_COLORS = frozenset(("gold", "silver", "bronze", "copper", "rose gold"))
-"""Colours that, of things which may be of metal, mean the metal ones."""
+"""Colours that mean the metal itself for objects that may be metallic."""
 SAME_COLOR = {"gray": "grey", "silvery": "silver", "golden": "gold", "rose": "pink", "crimson": "red", "scarlet": "red"}
 SAME_COLOR |= {"amber": "orange", "aqua": "cyan", "indigo": "navy", "lilac": "lavender", "transparent": "clear"}
 SAME_COLOR |= {"see through": "clear", "steel gray": "steel grey", "offwhite": "off white", "colorless": "clear"}
@@ -55,9 +55,10 @@ SHADES |= {"glossy": 0.0, "shiny": 0.0}
 
 @dataclass(frozen=True)
 class Look:
-    """The appearance and matter of a part: ``rgb`` sRGB in 0..1, PBR factors, a surface of the priors' materials, density.
+    """Appearance and material of a part: ``rgb`` sRGB in 0..1, PBR factors, a surface of the priors' materials, density.
 
-    ``wall`` is how thick such a wall is made, over one of ceramic: sheet metal is thin."""
+    ``wall`` is the usual wall thickness relative to ceramic: sheet metal is thin.
+    """
 
     material: str
     surface: str
@@ -68,7 +69,7 @@ class Look:
     wall: float = 1.0
 
     def colored(self, rgb: tuple[float, float, float]) -> Look:
-        """Return the same matter in another colour."""
+        """Return the same material in another colour."""
         return replace(self, rgb=rgb)
 
 
@@ -164,7 +165,7 @@ MATERIALS: dict[str, Look] = {
         _look("electronics", "plastic", "26272a", 0.35, 1800),
     )
 }
-"""Looks by the word for the material, in its own usual colour."""
+"""Looks by material word, in the material's usual colour."""
 FOODS: dict[str, Look] = {
     look.material: look
     for look in (
@@ -197,9 +198,9 @@ FOODS: dict[str, Look] = {
         _look("raw fish", "food skin", "ee8a5e", 0.35, 1060),
     )
 }
-"""Looks of food, which tables name and texts do not: what a chocolate mug is of, its name does not say.
+"""Looks of food, used by template tables but not in texts: a "chocolate mug" is not made of chocolate.
 
-Each is a piece with its air and skin; densities are the usual ones of ``prior_tables/food.toml`` or within their intervals.
+Each is a whole piece with its air and skin; densities are the usual ones of ``prior_tables/food.toml`` or within its intervals.
 """
 SAME_MATERIAL = {
     "wooden": "wood", "metal": "stainless steel", "metallic": "stainless steel", "stainless": "stainless steel",
@@ -225,9 +226,9 @@ SAME_MATERIAL = {
     "solid silver": "sterling silver",
 }  # fmt: skip
 OF_PRECIOUS_METAL = {"silver": "sterling silver", "gold": "solid gold"}
-"""Words that name a colour, but after 'of' a metal: a goblet of silver."""
+"""Colour words that name a metal after 'of': a goblet of silver."""
 SAID_OF = {"solid gold": "gold", "electronics": "plastic and electronics", "enamel": "enamelled steel"}
-"""How a material is written where the word for its look does not say it: electronics are mixed, enamel is on steel."""
+"""Wording of a material if it differs from the name of its look: electronics are mixed, enamel is on steel."""
 USUAL_COLORS: dict[str, tuple[str, ...]] = {
     "ceramic": ("white", "red", "blue", "navy", "green", "yellow", "black"),
     "porcelain": ("white", "ivory", "light blue", "navy"),
@@ -256,35 +257,35 @@ USUAL_COLORS: dict[str, tuple[str, ...]] = {
     "marble": ("", "", "black", "grey"),
     "stone": ("", "", "charcoal", "beige"),
 }
-"""Colours that things of a material usually have, by the word for it; '' is its own. What is not here has its own alone."""
+"""Usual colours of objects by material word; '' is the material's own colour. Other materials only have their own colour."""
 
 
 _COLORED_IMITATIONS = frozenset(("plastic", "rubber", "foam", "ceramic", "wax", "textile", "paper", "cardboard"))
-"""Surfaces on which imitations of food have its colours: a plastic banana is yellow, a wooden one shows its wood."""
+"""Surfaces on which imitation food has its natural colours: a plastic banana is yellow, a wooden one shows its wood."""
 
 
 def usual_looks(look: Look, usual: Iterable[Look]) -> list[Look]:
-    """Return looks of a material in the colours that a thing has: those among its ``usual`` looks, else the material's own."""
+    """Return looks of a material in the colours of an object: those among its ``usual`` looks, else the material's
+    usual colours.
+    """
     food = [each for each in usual if each.material in FOODS]
     if food and look.surface in _COLORED_IMITATIONS:
         return [look.colored(each.rgb) for each in food]
     own = [each for each in usual if each.material == look.material]
     seen = look.surface == "wood" or (look.surface == "steel" and look.metallic > 0)
-    if (
-        len(own) > 1 and not seen
-    ):  # a thing of wood or steel by its text shows the material: a red wooden handle would be painted
+    if len(own) > 1 and not seen:  # wood and steel named in a text stay visible: a red wooden handle would hide it
         return own
     return [look_of(f"{color} {look.material}".strip()) for color in USUAL_COLORS.get(look.material, ("",))]
 
 
 def color_of(word: str) -> tuple[float, float, float] | None:
-    """Return the sRGB colour that a word names, None where it names none."""
+    """Return the sRGB colour of a word; None if it is no colour."""
     name = SAME_COLOR.get(word, word)
     return _rgb(COLORS[name]) if name in COLORS else None
 
 
 def shaded(rgb: tuple[float, float, float], shade: str) -> tuple[float, float, float]:
-    """Return a colour as light or dark as a word before it says."""
+    """Return a colour lightened or darkened by a shade word."""
     amount = SHADES[shade]
     towards = np.ones(3) if amount > 0 else np.zeros(3)
     red, green, blue = (1 - abs(amount)) * np.array(rgb) + abs(amount) * towards
@@ -292,12 +293,12 @@ def shaded(rgb: tuple[float, float, float], shade: str) -> tuple[float, float, f
 
 
 def material_of(word: str) -> Look | None:
-    """Return the look of the material that a word or two name, None where they name none."""
+    """Return the look of the material named by one or two words; None if they name none."""
     return MATERIALS.get(SAME_MATERIAL.get(word, word))
 
 
 def look_of(words: str) -> Look:
-    """Return the look that 'colour material' or 'material' or a food describes; raises ValueError for any other words."""
+    """Return the look of 'colour material', 'material' or a food; raises ValueError for other words."""
     parts = words.split()
     for cut in range(len(parts)):
         called = " ".join(parts[cut:])

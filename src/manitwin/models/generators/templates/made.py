@@ -1,4 +1,4 @@
-"""A thing that was made from a template: its mesh by parts, its looks, its masses, and the meshes that show it."""
+"""Generated object: mesh with parts, looks and masses, and its visual meshes."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ from manitwin.twin.import_record import GivenParts
 
 @dataclass(frozen=True)
 class Made:
-    """A thing from a template: its mesh with parts, looks by part, known points, measures, masses (kg) and densities by part.
+    """A generated object: mesh with parts, looks by part, known points, measures, and masses (kg) and densities (kg/m^3) by part.
 
-    ``solids`` are what the parts add, without overlap, with their density (kg/m^3)."""
+    ``solids`` are the disjoint contributions of the parts with their densities (kg/m^3).
+    """
 
     category: str
     mesh: PartedMesh
@@ -37,7 +38,7 @@ class Made:
 
 
 def visual_parts(made: Made) -> list[trimesh.Trimesh]:
-    """Return a mesh a look with its PBR material, in the object frame; parts of one look are one mesh."""
+    """Return one mesh per look with its PBR material, in the object frame; parts with equal looks are merged."""
     parts = []
     for look, names, index in _by_look(made):
         faces = made.mesh.faces[index]
@@ -61,19 +62,19 @@ def visual_parts(made: Made) -> list[trimesh.Trimesh]:
 
 
 def face_parts(made: Made) -> GivenParts:
-    """Return the part of each face of ``visual_parts``, in the order in which their file is read again."""
+    """Return the part of each face of ``visual_parts``, in the order in which their file is read back."""
     order = np.concatenate([index for _, _, index in _by_look(made)])
     return given_parts(made.mesh.names, made.mesh.part[order], made.mesh.vertices, made.mesh.faces[order])
 
 
 def given_parts(names: Sequence[str], part: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> GivenParts:
-    """Return the parts ``(F,)`` of faces ``(F, 3)`` without those that a file in single precision makes lines of."""
+    """Return the parts ``(F,)`` of faces ``(F, 3)``, without faces that degenerate to lines in single precision."""
     kept = has_three_places(np.asarray(vertices, np.float32), faces)
     return GivenParts(names=list(names), of_face=part[kept].tolist())
 
 
 def _by_look(made: Made) -> list[tuple[Look, list[str], np.ndarray]]:
-    """Return each look with the parts that wear it and the numbers of their faces."""
+    """Return each look with its parts and the indices of their faces."""
     by_look: dict[Look, list[str]] = {}
     for part in made.mesh.names:
         by_look.setdefault(made.looks[part], []).append(part)

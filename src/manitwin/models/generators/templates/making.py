@@ -1,4 +1,4 @@
-"""Make what a text asks for: measures drawn within the category's intervals, scaled to the stated size, dressed in looks."""
+"""Make the object of a text: sample measures within the category's intervals, scale to the stated size, and assign looks."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from manitwin.models.generators.templates.text import Wanted
 
 LEAST_WALL_M = 0.0008
 SHEET_M = 0.0009
-"""The wall of hollow handles and stands of sheet metal: 0.8 to 1 mm of stainless steel."""
+"""Wall thickness of hollow sheet metal handles and stands: 0.8 to 1 mm of stainless steel."""
 SIZE_MARGIN = 2.0
-"""A stated size beyond the category's interval by more than this factor is taken for a mistake."""
+"""A stated size beyond the category's interval by more than this factor is rejected as a mistake."""
 
 
 def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Mapping[str, float] | None = None) -> Made:
-    """Make one thing of a template; raises UsageError for a size that no such thing has or a part that it has not.
+    """Make one object of a template; raises UsageError for an impossible size or an unknown part.
 
-    ``said`` are measures that are known, in place of drawn ones.
+    ``said`` are known measures, which replace sampled ones.
     """
     looks_by_slot = _looks(template, wanted, rng)
     measures = template.drawn(rng) | dict(said or {}) | dict(wanted.measures)
@@ -65,7 +65,9 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Map
 
 
 def _holds(template: Template, wanted: Wanted, looks: Mapping[str, Look]) -> Holds | None:
-    """Return the volume that is said beside lengths, and how what a thing of some measures holds is found; None where none is."""
+    """Return the volume stated in addition to lengths, with a function for the capacity at given measures; None if
+    there is none.
+    """
     amount = wanted.amount
     if amount is None or amount.volume_m3 is None:
         return None
@@ -77,7 +79,7 @@ def _holds(template: Template, wanted: Wanted, looks: Mapping[str, Look]) -> Hol
 
 
 def _wall(template: Template, look: Look) -> float:
-    """Return how thick a wall of a look is, over the one that the template states."""
+    """Return the wall thickness of a look relative to the template's."""
     return 1.0 if template.of_plate and look.surface in METALS else look.wall
 
 
@@ -90,7 +92,7 @@ def dressed(
     wishes: Mapping[str, Wish],
     scale: float,
 ) -> Made:
-    """Return a built model and its mesh, scaled, with the looks of its slots and what is wished for single parts."""
+    """Return a built model and its mesh, scaled, with the looks of its slots and the wishes for single parts."""
     looks = _looks_of(template, model, mesh.names, looks_by_slot, wishes)
     solids, masses, densities = list[tuple[Manifold, float]](), dict[str, float](), dict[str, float]()
     for part, built in model.assembly.solids():
@@ -120,7 +122,7 @@ def _looks_of(
     looks_by_slot: Mapping[str, Look],
     wishes: Mapping[str, Wish],
 ) -> dict[str, Look]:
-    """Return the look of each part: that of its slot, with what is wished for the part."""
+    """Return the look of each part: that of its slot, modified by wishes for the part."""
     looks = {part: looks_by_slot[model.slots[part] or next(iter(template.slots))] for part in parts}
     for part, wish in wishes.items():
         if part in looks and part not in template.slots:
@@ -129,12 +131,12 @@ def _looks_of(
 
 
 def _told_apart(model: Model, looks: Mapping[str, Look]) -> list[tuple[str, str]]:
-    """Return the regions, by name and part, that look unlike the part which they are of: their borders are seen."""
+    """Return the regions, as (name, part), whose look differs from their part, so that their borders are visible."""
     return [(name, of) for name, of in model.assembly.regions() if looks[name] != looks[of]]
 
 
 def _looks(template: Template, wanted: Wanted, rng: np.random.Generator) -> dict[str, Look]:
-    """Return the look of each slot: what the text says, else drawn; a slot of '' looks like the first."""
+    """Return the look of each slot, as stated or sampled; a slot of '' looks like the first slot."""
     looks: dict[str, Look] = {}
     first = next(iter(template.slots))
     for slot, choices in template.slots.items():
@@ -149,7 +151,7 @@ def _looks(template: Template, wanted: Wanted, rng: np.random.Generator) -> dict
 
 
 def _is_whole(wanted: Wanted, first: Look, usual: Sequence[Look]) -> bool:
-    """Tell whether a material that is said of the whole is that of a further part too: all of a wooden spatula is of wood."""
+    """Return whether a material stated for the whole object extends to a further part: a wooden spatula is entirely of wood."""
     said = wanted.wishes.get("", Wish()).material
     return (
         said is not None and said.surface in ("wood", "plastic") and first.surface in {look.surface for look in usual}
@@ -164,9 +166,9 @@ def _check_parts(template: Template, wanted: Wanted, mesh: PartedMesh) -> None:
 
 
 def _scale(template: Template, wanted: Wanted, model: Model, mesh: PartedMesh) -> float:
-    """Return the scale that gives the stated size, or the relative one; 1 where the text says neither, or several lengths.
+    """Return the scale for the stated or relative size; 1 if the text states neither, or several lengths.
 
-    Which side is meant by width is told by the size: of a keyboard of 40 cm the longer one.
+    The size decides which side a width refers to: for a keyboard of 40 cm, the longer one.
     """
     extents = np.ptp(mesh.vertices, axis=0)
     meant = _places(model, mesh, template.length_of) if template.length_of else mesh.vertices
@@ -196,13 +198,13 @@ def _scale(template: Template, wanted: Wanted, model: Model, mesh: PartedMesh) -
 
 
 def _places(model: Model, mesh: PartedMesh, part: str) -> np.ndarray:
-    """Return the vertices ``(N, 3)`` of a part, or of the parts that wear its slot."""
+    """Return the vertices ``(N, 3)`` of a part, or of the parts in a slot."""
     names = [at for at, name in enumerate(mesh.names) if part in (name, model.slots[name])]
     return np.asarray(mesh.vertices[np.unique(mesh.faces[np.isin(mesh.part, names)])])
 
 
 def _diagonal_m(vertices: np.ndarray) -> float:
-    """Return the largest distance of two of some vertices ``(N, 3)``."""
+    """Return the largest distance between any two of the vertices ``(N, 3)``."""
     hull = vertices[ConvexHull(vertices).vertices]
     return float(pdist(hull).max())
 

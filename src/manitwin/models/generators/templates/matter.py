@@ -1,4 +1,4 @@
-"""Whether a word for a material says what a thing is of, and of what such things usually are."""
+"""Decide whether a material word states what an object is made of, and which materials are usual for it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ NO_MATTER_BEFORE = frozenset(
     | {"cleaner", "cutter", "opener", "softener", "conditioner", "protector", "remover", "varnish", "oil", "filler"}
     | {"wash", "care", "wool", "punch", "man", "scrap", "pattern", "patterned", "print", "printed", "recycling"}
 )
-"""Behind the name of a material: the thing is not of it."""
+"""Words after a material name that show that the object is not made of it."""
 _NEVER_BEFORE_A_NAME = frozenset({"soap", "wax", "bristle", "electronics"})
 _WORKED_ON = {
     "tools": frozenset(
@@ -33,14 +33,15 @@ _WORKED_ON = {
     ),
     "office": frozenset({"paper"}),
 }
-"""Nouns before the name of a tool that say what it is for, by the priors' domain: a wood saw and a paper punch."""
+"""Nouns before a tool's name that state its purpose, by domain of the priors: a wood saw, a paper punch."""
 _SOFT = frozenset({"textile", "wax"})
 
 
 def is_matter(word: str, look: Look, of: Prior) -> bool:
-    """Tell whether a word before a thing's name says what it is of: the steel of a steel mug, not the wood of a wood saw.
+    """Return whether a word before an object's name states its material: steel of a steel mug, but not wood of a wood saw.
 
-    What such things are of anyway it always says; soap, wax and soft matter never of others, nor what a tool works on.
+    It does for usual materials of the object. It does not for soap, wax and soft materials on other objects, nor for the material
+    that a tool works on.
     """
     usual = surfaces_of(of)
     if look.surface in usual or is_food(of):
@@ -51,17 +52,17 @@ def is_matter(word: str, look: Look, of: Prior) -> bool:
 
 
 def is_food(prior: Prior) -> bool:
-    """Tell whether a prior is of food, whose imitations are of any matter."""
+    """Return whether a prior is of food, whose imitations may be of any material."""
     return prior.surface == "food skin"
 
 
 def is_composite(prior: Prior) -> bool:
-    """Tell whether things of a prior have parts of unlike matter, and are not of one of several."""
+    """Return whether objects of a prior have parts of different materials, rather than one of several materials."""
     return not is_food(prior) and not {"and", "with"}.isdisjoint(prior.material.split())
 
 
 def looks_in(material: str) -> list[Look]:
-    """Return the looks that the words of a prior's material name, metal as each of its kinds."""
+    """Return the looks of the materials in a prior's material text; metal stands for steel and aluminium."""
     words = material.replace(",", " ").replace("-", " ").split()
     looks, at = list[Look](), 0
     while at < len(words):
@@ -76,7 +77,7 @@ def looks_in(material: str) -> list[Look]:
 
 
 def surfaces_of(prior: Prior) -> frozenset[str]:
-    """Return the materials of the priors that the words of a prior's material name."""
+    """Return the surface materials in a prior's material text."""
     words = prior.material.replace(",", " ").split()
     return frozenset(
         {look.surface for look in looks_in(prior.material)} | {word for word in words if word in load_materials()}

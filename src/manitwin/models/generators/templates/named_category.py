@@ -1,4 +1,4 @@
-"""Which template's thing a sentence is about, and the words around its name."""
+"""Find the template that a sentence asks for, and the words around the object's name."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ _BEHIND = (
     | {"labelled", "labeled", "marked", "called", "named"}
     | PURPOSE
 )
-"""Words behind a name that begin what is said of the thing."""
+"""Words after a name that start its description."""
 _PARTED = frozenset({"of", "in", "from"})
-"""What a thing is, the words before these say: a box of pencils is a box."""
+"""Words after which contents or origin follow: a box of pencils is a box."""
 _SHOWN_AS = frozenset(
     {"piece", "kind", "sort", "type", "style", "model", "photo", "picture", "image"}
     | {"rendering", "render", "twin", "replica", "roll", "bar", "tube", "stick", "sheet", "block", "cube"}
 )
-"""What is behind 'of' is meant: a photo of a mug, a roll of duct tape."""
+"""Nouns whose object follows 'of': a photo of a mug, a roll of duct tape."""
 _GROUPS = frozenset(
     {"set", "pair", "pack", "packet", "stack", "pile", "bunch", "bundle", "collection", "group", "row", "handful"}
     | {"couple", "number", "lot", "lots", "dozen", "dozens"}
 )
 _ADJECTIVE = re.compile(r"[a-z]{4,}(?:ed|able|ible|less|proof|etic|omic|atic)")
-"""Words that are no nouns by their ending, but for those that the priors know: an eraser, magnetic."""
+"""Words with adjective endings, unless the priors know them as objects: an eraser is a noun, magnetic is not."""
 _ADJECTIVES = frozenset(
     {
         "heavy",
@@ -86,9 +86,9 @@ _ADJECTIVES = frozenset(
         "universal",
     }
 )
-"""What shops and people put behind a name that is part of no name."""
+"""Product adjectives after a name that are not part of it."""
 USED_ALIKE = 0.6
-"""The share of places of use in common, from which a thing of the same shape is worth a hint."""
+"""Minimum share of common functional features for an object of equal shape to be suggested."""
 _COUNTS = frozenset(
     {"two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "twenty", "dozen"}
     | {"dozens", "several", "many", "multiple", "few", "both", "various", "couple", "pairs", "sets"}
@@ -97,7 +97,7 @@ _COUNTS = frozenset(
 
 @dataclass(frozen=True)
 class NamedCategory:
-    """A template's category, materials or colours that its name says (``own``), and the words before and behind the name."""
+    """A template's category, materials or colours in its name (``own``), and the words before and after the name."""
 
     category: str
     own: list[str]
@@ -106,21 +106,21 @@ class NamedCategory:
 
 
 def plain_words(words: Sequence[str]) -> list[str]:
-    """Return words without the marks around them; a comma stays as a word of its own."""
+    """Return words without surrounding punctuation; a comma remains a word of its own."""
     return [word for word in (word if word == "," else word.strip('.!?;:()"/=') for word in words) if word]
 
 
 def find_category(words: Sequence[str], text: str, templates: Mapping[str, Template]) -> NamedCategory:
     """Return the category and the words around its name, which is the last and then the longest phrase that names one.
 
-    What a thing is, its last noun says: a phrase is no name where words follow that describe nothing (a mug rack is no mug),
-    but for those behind a preposition (a cup of tea is a cup, and so is a box of pencils a box). A material that the name says,
-    of those that such a thing is of, is one of the words around it: a wooden spoon is of wood, but a wood chisel is not. Where
-    the longer phrase is another thing that the priors know, a shorter one is that only where both have one form and the size
-    fits: a pesto jar is a jar, and a garlic bulb no light bulb. A template's bare name means it with nothing before it but how it
-    looks: a white king is a chess piece, and a drama king is none.
+    The head noun of a phrase determines the object. A phrase is no name if words follow that describe nothing (a mug rack is no
+    mug), except after a preposition (a cup of tea is a cup, a box of pencils a box). A material in the name that is usual for the
+    object counts as one of the words around it: a wooden spoon is of wood, a wood chisel is not. If the longer phrase is another
+    object of the priors, a shorter one only matches if both have one shape and the size fits: a pesto jar is a jar, a garlic bulb
+    is no light bulb. A template's bare name only matches after words of appearance: a white king is a chess piece, a drama king
+    is not.
 
-    Raises UsageError for words that name no category, or several things.
+    Raises UsageError for words that name no category, or several objects.
     """
     words = plain_words(words)
     names = {
@@ -165,7 +165,7 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
 
 
 def _is_alone(before: Sequence[str], tail: Sequence[str], template: Template) -> bool:
-    """Tell whether words before a bare name say no more than how a thing looks, and all of a material that such things are of."""
+    """Return whether the words around a bare name only describe appearance, with materials that are usual for the object."""
     usual = {look_of(choice).surface for choices in template.slots.values() for choice in choices if choice}
     looks = [look for word in (*before, *tail) if (look := material_of(word)) is not None]
     said = all(word in FILLER_WORDS or word in RELATIVE or is_described(word) for word in before)
@@ -173,11 +173,11 @@ def _is_alone(before: Sequence[str], tail: Sequence[str], template: Template) ->
 
 
 def _says_more(tail: Sequence[str]) -> bool:
-    """Tell whether words behind a thing's name say more of it, and are no part of the name: 'in red', 'A5', 'size 42'."""
+    """Return whether the words after a name describe it and are not part of the name: 'in red', 'A5', 'size 42'."""
     first, *rest = tail
     if first in _BEHIND or speaks_of_others(tail, 0) or is_size_code(first):
         return True
-    if first == "size":  # 'size 42', and no 'king size bed'
+    if first == "size":  # 'size 42', but not 'king size bed'
         return bool(rest) and (_says_more(rest) or rest[0] in RELATIVE)
     if any(character.isdigit() for character in first) and not _is_number(first):
         return True
@@ -188,7 +188,7 @@ def _says_more(tail: Sequence[str]) -> bool:
 
 
 def is_adjective(word: str) -> bool:
-    """Tell whether a word that says no colour is no noun: 'magnetic', 'foldable', 'heavy duty'."""
+    """Return whether a word that is no colour is not a noun either: 'magnetic', 'foldable', 'heavy duty'."""
     return word in _ADJECTIVES or (_ADJECTIVE.fullmatch(word) is not None and named(word) is None)
 
 
@@ -199,10 +199,10 @@ def _is_number(word: str) -> bool:
 def _says_how_it_looks(
     words: Sequence[str], start: int, end: int, prior: Prior | None, names: Mapping[str, str]
 ) -> bool:
-    """Tell whether words that name a thing say how one before them looks or tastes: glass of 'a bottle, green glass'.
+    """Return whether words that name an object describe the look or taste of a preceding one: glass of 'a bottle, green glass'.
 
-    So do a material behind a comma or 'that is', a colour behind it or the thing's name ('a mug orange'), and food before a
-    colour ('a mug, lemon yellow') or behind a comma.
+    This holds for a material after a comma or 'that is', a colour after these or the name ('a mug orange'), and food before a
+    colour ('a mug, lemon yellow') or after a comma.
     """
     phrase, behind, before = " ".join(words[start:end]), words[end] if end < len(words) else "", words[:start]
     is_look = end - start == 1 and material_of(phrase) is not None
@@ -218,12 +218,12 @@ def _says_how_it_looks(
 
 
 def _parts(words: Sequence[str], at: int) -> bool:
-    """Tell whether a word parts a thing from what is in it or beside it: 'full' in 'a cup full of tea'."""
+    """Return whether a word separates an object from its contents or surroundings: 'full' in 'a cup full of tea'."""
     return words[at] in _PARTED or speaks_of_others(words, at)
 
 
 def _without_counter(before: list[str]) -> list[str]:
-    """Return the words before a name without what it is counted by: red, of 'a pair of red pliers'."""
+    """Return the words before a name without its counter: red, of 'a pair of red pliers'."""
     at = next(
         (at for at, (word, of) in enumerate(pairwise(before)) if of == "of" and word in _GROUPS | _SHOWN_AS), None
     )
@@ -231,7 +231,7 @@ def _without_counter(before: list[str]) -> list[str]:
 
 
 def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior, names: set[str]) -> None:
-    """Raise UsageError where a text asks for several objects: a pair of pliers is one, and two forks are not."""
+    """Raise UsageError if a text asks for several objects: a pair of pliers is one object, two forks are not."""
     words = [*before, *name]
     plural = name[-1].endswith("s") and named(name[-1].removesuffix("s")) is not None
     groups = [word for word, of in pairwise(words) if of == "of" and word in _GROUPS]
@@ -257,7 +257,7 @@ def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior
 
 
 def _stands_for(meant: Prior, category: str) -> bool:
-    """Tell whether things of a category look like those that are meant, and may be as large."""
+    """Return whether objects of a category look like the meant ones and may be equally large."""
     prior = load_priors()[category]
     same = (
         meant.category not in KIN_OF_ANOTHER_SHAPE
@@ -268,9 +268,9 @@ def _stands_for(meant: Prior, category: str) -> bool:
 
 
 def _own_words(called: list[str], template: Template, prior: Prior) -> list[str]:
-    """Return the words of a name that say a material which the first slot of a template has, or another than is usual.
+    """Return the words of a name that state a material of the template's first slot, or an unusual one.
 
-    Of food, the colour too: a green apple is green, and a red wine glass is not red.
+    For food also the colour: a green apple is green, but a red wine glass is not red.
     """
     if is_food(prior) and (colors := [word for word in called[:-1] if color_of(word) is not None]):
         return colors
@@ -280,7 +280,7 @@ def _own_words(called: list[str], template: Template, prior: Prior) -> list[str]
 
 
 def _no_category(text: str, words: list[str], templates: Mapping[str, Template]) -> str:
-    """Say that no template makes a thing, and which are of its shape; of a word that nobody knows, which are spelt alike."""
+    """Return the error message for an unknown object, with templates of equal shape or similarly spelt names."""
     meant = lookup(" ".join(words))
     alike = [] if meant is None else [name for name in templates if _is_used_alike(load_priors()[name], meant)]
     if alike:
@@ -288,11 +288,11 @@ def _no_category(text: str, words: list[str], templates: Mapping[str, Template])
     else:
         names = sorted({name for template in templates.values() for name in (template.category, *template.names)})
         said = words if meant is None else meant.category.split()
-        # from the noun, which is the last word
+        # Start with the last word, the noun.
         spelt = dict.fromkeys(
             name for word in reversed(said) for name in get_close_matches(word, names, n=2, cutoff=0.6)
         )
-        # a block may be a building block
+        # "block" may mean a building block.
         kinds = [name for name in names if said and name.endswith(f" {said[-1]}")]
         near = [*kinds, *(name for name in spelt if name not in kinds)]
         hint = f"; did you mean {', '.join(near[:4])}?" if near else "."
@@ -300,6 +300,6 @@ def _no_category(text: str, words: list[str], templates: Mapping[str, Template])
 
 
 def _is_used_alike(one: Prior, other: Prior) -> bool:
-    """Tell whether two kinds of things have one shape and nearly the same places of use."""
+    """Return whether two categories have one shape and nearly the same functional features."""
     ours, theirs = ({part.feature for part in prior.functional} for prior in (one, other))
     return one.shape == other.shape and len(ours & theirs) >= USED_ALIKE * len(ours | theirs)

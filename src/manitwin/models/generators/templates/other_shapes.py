@@ -1,4 +1,4 @@
-"""What the priors call by the name of a template's category, or keep with it, and the template does not look like."""
+"""Names that the priors relate to a template's category although the template has another shape."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manitwin.models.generators.templates.vocabulary import FILLER_WORDS
 
 
 def _listed(names: str) -> frozenset[str]:
-    """Return names that are listed with commas between them."""
+    """Return the names of a comma-separated list."""
     return frozenset(" ".join(names.split()).split(", "))
 
 
@@ -27,7 +27,7 @@ KIN_OF_ANOTHER_SHAPE = _listed(
     ink bottle
     """
 )
-"""Kin in the priors of what a template makes, of another shape or look: a kettlebell is no dumbbell, a lime no lemon."""
+"""Categories that the priors relate to a template's, of another shape or look: a kettlebell is no dumbbell, a lime no lemon."""
 _NAMES_OF_OTHERS = _listed(
     """
     cherry tomato, baguette, jenga block, alphabet block, cuboid, tile, disc, game piece, timber,
@@ -37,7 +37,7 @@ _NAMES_OF_OTHERS = _listed(
     coin battery, button battery
     """
 )
-"""Other names in the priors of a template's category, of what it does not make: a boot is no low shoe."""
+"""Aliases of a template's category in the priors for objects that it does not make: a boot is no low shoe."""
 _COMPOUNDS = _listed(
     """
     cookie cutter, biscuit cutter, glass cutter, pipe cutter, bolt cutter, tile cutter, cigar cutter, fried egg, scrambled
@@ -48,13 +48,13 @@ _COMPOUNDS = _listed(
     socket wrench, socket spanner, torque wrench, pipe wrench, strap wrench
     """
 )
-"""A template's name behind a word that makes it another thing: a horse shoe is no shoe."""
+"""Compounds of a template's name that mean another object: a horse shoe is no shoe."""
 _PARTS_TOO = frozenset({"cap"})
-"""What names a thing alone, behind another noun names a part or a cover: a bottle cap is not for a head."""
+"""Names that mean an object alone, but a part or cover after another noun: a bottle cap is not for a head."""
 
 
 def is_of_another_shape(phrase: str, before: Sequence[str]) -> bool:
-    """Tell whether no template makes what is named, behind other words, though the priors have it as that of a category."""
+    """Return whether no template makes the named object, although the priors assign the name to a template's category."""
     said = {*singulars(phrase)}
     if before and any(f"{before[-1]} {each}" in _COMPOUNDS for each in (phrase, *singulars(phrase))):
         return True

@@ -1,4 +1,4 @@
-"""Change a template's measures until the thing has several stated lengths at once: '30 x 20 x 15 cm', 'with a 20 cm blade'."""
+"""Solve for a template's measures given several lengths at once: '30 x 20 x 15 cm', 'with a 20 cm blade'."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from manitwin.models.generators.templates.template import Model, Template
 
 X, Y, Z = range(3)
 _AXES = {"height": (Z,), "width": (X, Y), "length": (X, Y, Z), "depth": (X, Y, Z), "": (X, Y, Z)}
-"""The axes along which a length with a direction may be; ``second`` is along that of the second largest extent."""
+"""Axes that a length with a direction may refer to; ``second`` refers to the axis of the second largest extent."""
 _SPELT = {"": "longest side", "second": "second longest side"}
 WALL = "wall_m"
 MOST_STEPS, DIFFERENCE, CLOSE = 12, 0.01, 0.002
 MOST_M = 100.0
 LEAST_M3 = 1e-9
 MARGIN = 2.0
-"""Beyond the interval of a measure by more than this factor a thing is no longer what the template makes."""
+"""Maximum factor by which a measure may leave its interval; beyond it, the template no longer describes the object."""
 
 
 @dataclass(frozen=True)
 class Holds:
-    """A volume that a vessel is to hold, in somebody's words, and what tells how much it does, by model, mesh and measures."""
+    """A required capacity, its wording, and a function that computes the capacity from model, mesh and measures."""
 
     volume_m3: float
     said: str
@@ -41,9 +41,9 @@ def proportioned(
     part_lengths_m: Mapping[str, float],
     holds: Holds | None = None,
 ) -> dict[str, float]:
-    """Return measures near the given ones with which a template's thing has the stated lengths, as ``_with_lengths`` says.
+    """Return measures close to the given ones with which the object has the stated lengths; see ``_with_lengths``.
 
-    Length, width and height of what is taller than long may be its sides by size, as luggage is measured: 55 x 40 x 20 cm.
+    For objects taller than long, length, width and height may be the sides by size, as is usual for luggage: 55 x 40 x 20 cm.
     """
     try:
         return _with_lengths(template, measures, lengths_m, part_lengths_m, holds)
@@ -64,11 +64,12 @@ def _with_lengths(
     part_lengths_m: Mapping[str, float],
     holds: Holds | None,
 ) -> dict[str, float]:
-    """Return measures near the given ones with which a template's thing has the stated lengths.
+    """Return measures close to the given ones with which the object has the stated lengths.
 
-    ``lengths_m`` by direction, ``part_lengths_m`` of the longest side of a part or a slot, ``holds`` what is held besides. All is
-    scaled as one, then the measures but the wall are changed as little as can be, by their logarithms (Gauss-Newton, minimum
-    norm). Raises UsageError where no such thing has all that at once, or such a part.
+    ``lengths_m`` are lengths by direction, ``part_lengths_m`` those of the longest side of a part or slot, ``holds`` an
+    additional capacity. The object is scaled as a whole first. Then the logarithms of the measures, except the wall, are changed
+    as little as possible (Gauss-Newton, minimum norm). Raises UsageError if the values cannot be met together, or for an unknown
+    part.
     """
     changed = dict(measures)
     free = [name for name in template.measures if name != WALL]
@@ -107,15 +108,16 @@ def _with_lengths(
 
 
 def _axes(sides_m: np.ndarray, lengths_m: Mapping[str, float], targets_m: np.ndarray) -> list[int]:
-    """Return an axis for each length: of what the directions allow, those that change the shape least; none where they cannot be.
+    """Return an axis for each length: the assignment, among those allowed, that changes the shape least; empty if there is none.
 
-    ``targets_m (K,)`` are the lengths and what is said besides, which is now behind the three extents in ``sides_m``.
+    ``targets_m (K,)`` are the lengths followed by the other targets, whose current values follow the three extents in
+    ``sides_m``.
     """
     longest, middle, least = (int(axis) for axis in np.argsort(-sides_m[:3], kind="stable"))
     said = dict(zip(lengths_m, targets_m, strict=False))
     is_round = np.isclose(sides_m[longest], sides_m[middle], rtol=1e-3)
     if is_round and {"", "second"} <= said.keys() and not np.isclose(said[""], said["second"], rtol=1e-3):
-        middle = least  # a bowl of 15 x 7 cm is so wide and so high
+        middle = least  # a bowl of 15 x 7 cm: width and height
     both = {"": (longest,), "second": (middle,)} if {"", "second"} <= lengths_m.keys() else {"second": (X, Y, Z)}
     choices = [both.get(direction, _AXES.get(direction, ())) for direction in lengths_m]
     of_parts = [*range(3, len(sides_m))]
@@ -128,7 +130,7 @@ def _axes(sides_m: np.ndarray, lengths_m: Mapping[str, float], targets_m: np.nda
 def _sides_m(
     template: Template, measures: Mapping[str, float], parts: Mapping[str, float], holds: Holds | None
 ) -> np.ndarray:
-    """Return the extents along X, Y and Z of what the measures give, the longest of each part, and a cube's that it holds."""
+    """Return the extents along X, Y and Z, the longest side of each part, and the cube root of the capacity."""
     try:
         model = template.build(**measures)
         mesh = model.assembly.mesh()

@@ -1,4 +1,4 @@
-"""How long things lie that are bent: on two places with the centre of mass between them."""
+"""Resting pose of long bent objects: supported at two points with the centre of mass between them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from manitwin.models.generators.templates.template import Model, Vector
 
 
 def rested(model: Model) -> Model:
-    """Return a model that lies along X tipped about Y as it comes to rest, on z = 0.
+    """Return a model that lies along X, tipped about Y into its resting pose on z = 0.
 
-    A spoon that is put on its bowl tips until the end of its handle is on the table too.
+    A spoon laid on its bowl tips until the end of its handle touches the table.
     """
     pitch_rad = resting_pitch_rad(model.assembly.triangles_m())
     cosine, sine = np.cos(pitch_rad), np.sin(pitch_rad)
@@ -28,14 +28,14 @@ def rested(model: Model) -> Model:
 
 
 def resting_pitch_rad(triangles_m: np.ndarray) -> float:
-    """Return the least turn about Y (from Z to X) that sets a solid on an edge of its outline with its centre of mass above it.
+    """Return the smallest rotation about Y (from Z to X) that puts a solid on a hull edge below its centre of mass.
 
-    ``triangles_m (F, 3, 3)`` are its closed surface, wound outward; the outline is that of its convex hull seen along Y.
+    ``triangles_m (F, 3, 3)`` are its closed, outward-oriented surface; the hull is the convex hull projected along Y.
     """
     volumes = np.linalg.det(triangles_m)
     center = (volumes[:, None] * triangles_m.sum(axis=1)).sum(axis=0) / (4 * volumes.sum())
     outline = triangles_m.reshape(-1, 3)[:, ::2]
-    corners = outline[ConvexHull(outline).vertices]  # counter-clockwise: the edges below run towards +X
+    corners = outline[ConvexHull(outline).vertices]  # counter-clockwise: lower edges run towards +X
     edges = np.roll(corners, -1, axis=0) - corners
     share = ((center[::2] - corners) * edges).sum(axis=1) / (edges**2).sum(axis=1)
     carries = (edges[:, 0] > 0) & (share >= 0) & (share <= 1)

@@ -1,4 +1,4 @@
-"""Sizes that standards and makers name: paper A5, an envelope C5, a battery AAA, a bolt M8 x 40, a toy brick of 2 x 4 studs."""
+"""Named standard sizes: paper A5, an envelope C5, an AAA battery, an M8 x 40 bolt, a toy brick of 2 x 4 studs."""
 
 from __future__ import annotations
 
@@ -12,40 +12,40 @@ from manitwin.errors import UsageError
 
 _MM, _INCH = 1e-3, 0.0254
 _SERIES_MM = {"a": (1189, 841), "b": (1414, 1000), "c": (1297, 917)}
-"""ISO 216 (A, B) and ISO 269 (C): the sheet of number 0; each next one is the half, rounded down to whole millimetres."""
+"""ISO 216 (A, B) and ISO 269 (C): sheet number 0; each next one is half, rounded down to whole millimetres."""
 _LEAST_SHEET = 8
 _SHEETS_M = {
     "dl": (220 * _MM, 110 * _MM), "letter-size": (11 * _INCH, 8.5 * _INCH), "legal-size": (14 * _INCH, 8.5 * _INCH),
     "tabloid-size": (17 * _INCH, 11 * _INCH), "#9": (8.875 * _INCH, 3.875 * _INCH), "#10": (9.5 * _INCH, 4.125 * _INCH),
 }  # fmt: skip
-"""ISO 269's DL, the sheets of ANSI Y14.1 and stationers, and the two commonest envelopes of the United States."""
+"""DL of ISO 269, the sheets of ANSI Y14.1 and of stationers, and the two commonest envelopes of the United States."""
 _OF_SHEET_SIZE = frozenset({"notebook", "book", "envelope"})
-"""What is as large as its sheet; a clipboard and a folder are larger, by no standard."""
+"""Categories as large as their sheet; clipboards and folders are larger, by no standard."""
 _CELLS_M = {
     "aaaa": (0.0425, 0.0083), "aaa": (0.0445, 0.0105), "aa": (0.0505, 0.0145), "c": (0.05, 0.0262), "d": (0.0615, 0.0342),
 }  # fmt: skip
-"""Length and diameter of IEC 60086-2, the largest that it admits."""
+"""Maximum length and diameter of IEC 60086-2."""
 _BOLTS_MM = {
     3: (5.5, 2.0), 4: (7.0, 2.8), 5: (8.0, 3.5), 6: (10.0, 4.0), 8: (13.0, 5.3), 10: (16.0, 6.4), 12: (18.0, 7.5),
     16: (24.0, 10.0), 20: (30.0, 12.5),
 }  # fmt: skip
-"""Width across the flats and height of the head by the thread's diameter, ISO 4014 and 4017."""
+"""Width across flats and head height by thread diameter, ISO 4014 and 4017."""
 _NUTS_MM = {
     3: (5.5, 2.4), 4: (7.0, 3.2), 5: (8.0, 4.7), 6: (10.0, 5.2), 8: (13.0, 6.8), 10: (16.0, 8.4), 12: (18.0, 10.8),
     16: (24.0, 14.8), 20: (30.0, 18.0),
 }  # fmt: skip
-"""Width across the flats and height, ISO 4032."""
+"""Width across flats and height, ISO 4032."""
 _WASHERS_MM = {
     3: (3.2, 7.0, 0.5), 4: (4.3, 9.0, 0.8), 5: (5.3, 10.0, 1.0), 6: (6.4, 12.0, 1.6), 8: (8.4, 16.0, 1.6),
     10: (10.5, 20.0, 2.0), 12: (13.0, 24.0, 2.5), 16: (17.0, 30.0, 3.0), 20: (21.0, 37.0, 3.0),
 }  # fmt: skip
-"""Bore, width and thickness, ISO 7089."""
+"""Bore, outer diameter and thickness, ISO 7089."""
 STUD_PITCH_M, BRICK_HEIGHT_M, BRICK_GAP_M = 0.008, 0.0096, 0.0002
-"""Of the toy bricks that most are made like: studs 8 mm apart, 9.6 mm high without them, 0.2 mm less than their places."""
+"""Common toy bricks: studs 8 mm apart, 9.6 mm high without studs, and 0.2 mm smaller than their grid cells."""
 _BRICK_STUDS = "2x4"
-"""What the template has."""
+"""The studs of the template."""
 _CORNERS = float(1 / np.cos(np.pi / 6))
-"""The width of a hexagon over its corners, by that across its flats."""
+"""Width across corners of a hexagon relative to its width across flats."""
 _THREAD = re.compile(r"m(\d+)(?:x(\d+(?:\.\d+)?))?")
 _REWRITTEN = (
     (r"\b(?:us |ansi )?(letter|legal|tabloid) (?:sized?|format|paper)\b", r"\1-size"),
@@ -65,7 +65,7 @@ _REWRITTEN = (
 
 @dataclass(frozen=True)
 class StandardSize:
-    """What a named size, ``code``, says of a thing: measures of its template (m and ratios), or lengths (m) by direction."""
+    """A named size ``code`` as measures of its template (metres and ratios), or lengths (m) by direction."""
 
     code: str
     measures: Mapping[str, float] = field(default_factory=dict)
@@ -73,21 +73,21 @@ class StandardSize:
 
 
 def in_codes(plain: str) -> str:
-    """Return a text, as ``in_figures`` writes it, with named sizes as one word each: 'letter-size', 'm8x40', '2x4'."""
+    """Return a text in the form of ``in_figures`` with each named size as one word: 'letter-size', 'm8x40', '2x4'."""
     for spelt, code in _REWRITTEN:
         plain = re.sub(spelt, code, plain)
     return plain
 
 
 def is_size_code(word: str) -> bool:
-    """Tell whether a word, as ``in_codes`` writes it, is the name of a size and nothing else."""
+    """Return whether a word in the form of ``in_codes`` is a named size and nothing else."""
     return word in _SHEETS_M or word in _CELLS_M
 
 
 def standard_size(category: str, words: Sequence[str]) -> StandardSize | None:
-    """Return the first named size among words, as ``in_codes`` writes them, that things of a category have; None without one.
+    """Return the first named size that applies to a category, among words in the form of ``in_codes``; None if there is none.
 
-    Raises UsageError for a toy brick of other studs than the template has.
+    Raises UsageError for a toy brick with other studs than the template's.
     """
     found = (_size(category, word) for word in words)
     return next((size for size in found if size is not None), None)
@@ -95,7 +95,7 @@ def standard_size(category: str, words: Sequence[str]) -> StandardSize | None:
 
 def _size(category: str, word: str) -> StandardSize | None:
     if category == "envelope" and word[0] == "a":
-        return None  # in the United States it is larger than the sheet of that name
+        return None  # US envelopes of these names are larger than the sheets
     if category in _OF_SHEET_SIZE and (sheet_m := _sheet_m(word)) is not None:
         return StandardSize(word, lengths_m={"": sheet_m[0], "second": sheet_m[1]})
     if category == "battery" and word in _CELLS_M:
@@ -113,7 +113,7 @@ def _size(category: str, word: str) -> StandardSize | None:
 
 
 def _fastener(category: str, code: str, thread_mm: int, length_mm: str | None) -> StandardSize | None:
-    """Return the measures of a bolt, a nut or a washer of a metric thread; of a bolt, those that go with its usual length too."""
+    """Return the measures of a bolt, nut or washer of a metric thread; a bolt without a stated length gets the usual one."""
     if category == "washer" and thread_mm in _WASHERS_MM:
         bore, width, thick = _WASHERS_MM[thread_mm]
         return StandardSize(code, {"width_m": width * _MM, "hole": bore / width, "thick": thick / width})
@@ -131,11 +131,11 @@ def _fastener(category: str, code: str, thread_mm: int, length_mm: str | None) -
 
 
 USUAL_SHANKS = 5.0
-"""Of a bolt whose length is not said, over its thread: ISO 4017 has such of each."""
+"""Shank length of a bolt without a stated length, in thread diameters; ISO 4017 lists it for every thread."""
 
 
 def _sheet_m(word: str) -> tuple[float, float] | None:
-    """Return the long and the short side of a sheet or an envelope of a name; None where it is none."""
+    """Return the long and short side of a named sheet or envelope; None if the name is unknown."""
     if word in _SHEETS_M:
         return _SHEETS_M[word]
     if not re.fullmatch(rf"[abc][0-{_LEAST_SHEET}]", word):

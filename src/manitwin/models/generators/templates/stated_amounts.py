@@ -1,4 +1,4 @@
-"""Read the volume or the mass that a sentence states: '500 ml', 'half a litre', '12 oz', '2 kg'."""
+"""Parse the volume or mass stated in a sentence: '500 ml', 'half a litre', '12 oz', '2 kg'."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _VOLUMES_M3 = {
     r"(?:uk|imperial|imp\.?|british) (?:quarts?|qts?)": 1136.523e-6,
     r"(?:uk|imperial|imp\.?|british) (?:gallons?|gals?)": 4.54609e-3,
 }  # fmt: skip
-"""Of the United States where nothing else is said: those of Britain have the same names."""
+"""US units unless stated otherwise; British units have the same names."""
 _MASSES_KG = {
     r"kilograms?|kilogrammes?|kilos?|kg": 1.0, r"grams?|grammes?|g": 1e-3, r"pounds?|lbs?": 0.45359237,
 }  # fmt: skip
 _OUNCE_M3, _OUNCE_KG = 29.5735e-6, 0.0283495
-"""Fluid and avoirdupois."""
+"""Fluid ounce and avoirdupois ounce."""
 _UNITS = "|".join([*_VOLUMES_M3, *_MASSES_KG, "ounces?|oz"])
 _NUMERALS = {"half": 0.5, "quarter": 0.25, "one": 1.0, "two": 2.0, "three": 3.0, "four": 4.0, "five": 5.0, "ten": 10.0}
 _AMOUNT = re.compile(
@@ -32,13 +32,13 @@ _AMOUNT = re.compile(
     rf"({_UNITS})\b\.?(?: (?:capacity|in weight|in volume|heavy))?"
 )
 _OR_SO = frozenset({"/", "(", "="})
-"""Between two amounts that are one in other units."""
+"""Separators between two expressions of one amount in different units."""
 _RANGE = re.compile(rf"[\d.]+ ?(?:–|to|or) ?\d[\d.]* ?(?:{_UNITS})\b")
 
 
 @dataclass(frozen=True)
 class Amount:
-    """What a thing holds (m^3) or weighs (kg), whichever is said; ``said`` are the words."""
+    """A stated capacity (m^3) or mass (kg); ``said`` is its wording."""
 
     said: str
     volume_m3: float | None = None
@@ -46,9 +46,9 @@ class Amount:
 
 
 def amounts_in(plain: str, prior: Prior) -> list[Amount]:
-    """Return the volumes and masses that a text, as ``in_figures`` writes it, states of a thing; ounces of a vessel are fluid.
+    """Return the volumes and masses stated in a text in the form of ``in_figures``; ounces of a container are fluid ounces.
 
-    Raises UsageError where the text says from which to which amount.
+    Raises UsageError for a range of amounts.
     """
     if (between := _RANGE.search(plain)) is not None:
         raise UsageError(f"{between[0]!r} states a range; give one amount")
@@ -72,7 +72,7 @@ def amounts_in(plain: str, prior: Prior) -> list[Amount]:
 
 
 def _is_rounded(one: Amount, other: Amount) -> bool:
-    """Tell whether two amounts are one in other units, but for rounding: '16 oz (473 ml)'."""
+    """Return whether two amounts are equal up to rounding in different units: '16 oz (473 ml)'."""
     pairs = ((one.volume_m3, other.volume_m3), (one.mass_kg, other.mass_kg))
     same = [abs(a - b) <= ROUNDED * max(a, b) for a, b in pairs if a is not None and b is not None]
     return one.said.split()[-1] != other.said.split()[-1] and same == [True]
@@ -83,5 +83,5 @@ def _size(unit: str, units: dict[str, float]) -> float | None:
 
 
 def without_amounts(plain: str) -> str:
-    """Return a text, as ``in_figures`` writes it, without volumes and masses."""
+    """Return a text in the form of ``in_figures`` without volumes and masses."""
     return " ".join(_AMOUNT.sub(" ", plain).split())

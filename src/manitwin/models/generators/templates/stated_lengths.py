@@ -1,4 +1,4 @@
-"""Read the lengths that a sentence states: '9 cm tall', 'three-inch', '1 ft 2 in', '1/2 inch'."""
+"""Parse the lengths stated in a sentence: '9 cm tall', 'three-inch', '1 ft 2 in', '1/2 inch'."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _NUMBER = rf"(?<![\w.]){_DIGITS}"
 _AMOUNT = rf"({_NUMBER}) ?({_UNIT})\b\.?"
 _MEASURES = "height|width|length|diameter|depth"
 LENGTH = re.compile(rf"{_AMOUNT} ?(?:in (?={_MEASURES}))?(\w{{0,12}})")
-"""A length as ``in_figures`` writes it: number, unit, and the word behind it, which may be a direction."""
+"""A length in the form of ``in_figures``: number, unit, and the following word, which may be a direction."""
 _OF_A_PART = re.compile(
     rf"(?:^| )(with|having|and)( an?) {_AMOUNT}( long)?((?: \w+){{0,3}}?) (\w+)"
     r"(?=$| ?[,;.]| (?:and|with|having|of|in|made|for)\b)"
 )
-"""'with a 20 cm blade', 'and a 9 cm long wooden handle'; the part is called by the last word."""
+"""'with a 20 cm blade', 'and a 9 cm long wooden handle'; the last word is the part."""
 _PART_OF_LENGTH = re.compile(
     rf"(?<= )(with|having|and) (?:an? )?((?:[a-z]+ ){{0,2}}?(?!{_MEASURES}|size)[a-z]+) (?:(?:length )?of |length ){_AMOUNT}"
     r"(?: (?:long|across|in diameter|in length|diameter))?(?=$| ?[,;]| (?:and|with|having|made|for)\b)"
@@ -33,7 +33,7 @@ _PART_OF_LENGTH = re.compile(
 _NAMED_LENGTH = re.compile(rf"\b({_MEASURES})(?: of| ?[:=])? ({_AMOUNT})")
 _AMOUNT_OR_NUMBER = rf"({_NUMBER})(?: ?({_UNIT})\b\.?)?"
 _BY = re.compile(rf"{_AMOUNT_OR_NUMBER} x {_AMOUNT_OR_NUMBER}(?: x {_AMOUNT_OR_NUMBER})?(?: in (?:size|all))?")
-"""'30 x 20 x 15 cm': a number without a unit has that of the last one."""
+"""'30 x 20 x 15 cm'; a number without a unit has that of the last one."""
 _TIMES = re.compile(rf"(?<=\d) ?(?:({_UNIT})\.?)? ?(?:x|by|×|\*) ?(?=\.?\d)")
 _LETTERS = r"\(?\b([lwhd]) ?[x×] ?([lwhd])(?: ?[x×] ?([lwhd]))?\b\)?"
 _SIDES = rf"({_DIGITS}) ?[x×] ?({_DIGITS})(?: ?[x×] ?({_DIGITS}))? ?({_UNIT})\b"
@@ -41,7 +41,7 @@ _LETTERS_FIRST = re.compile(rf"{_LETTERS}[ :]*{_SIDES}")
 _LETTERS_LAST = re.compile(rf"{_SIDES} ?{_LETTERS}")
 """'(LxWxH): 30x20x10 cm' and '30x20x10 cm (LxWxH)'."""
 _ONE_LETTERED = re.compile(rf"\b([lwh])[ :.=]{{1,2}}(?={_DIGITS} ?(?:{_UNIT})\b)")
-"""'h 30 cm', of one side."""
+"""'h 30 cm', a single side."""
 _WORD_OF = {"l": "length", "w": "width", "h": "height"}
 _LETTERED_SIDE = rf"(?:\b([lwhd])[ :]?)?({_DIGITS}) ?({_UNIT})?\.? ?(?:\(?([lwhd])\b\)?)?"
 _LETTERED = re.compile(rf"(?<![\w.]){_LETTERED_SIDE} ?[x×] ?{_LETTERED_SIDE}(?: ?[x×] ?{_LETTERED_SIDE})?(?!\w)")
@@ -49,19 +49,19 @@ _LETTERED = re.compile(rf"(?<![\w.]){_LETTERED_SIDE} ?[x×] ?{_LETTERED_SIDE}(?:
 _RANGE = re.compile(rf"\d ?(?:-|–|—|\.{{2,3}}|(?:{_UNIT})?\.? ?(?:to|or|and)) ?{_AMOUNT}")
 _IN_TWO_UNITS = re.compile(rf"{_AMOUNT} ?[/(=] ?{_AMOUNT}\)?")
 ROUNDED = 0.04
-"""Share by which one amount may differ that is said in two units: 12 in is called 30 cm, 16 ft 5 m and 10 in 25 cm."""
+"""Maximum relative difference of one amount in two units: 12 in is called 30 cm, 16 ft 5 m and 10 in 25 cm."""
 DIRECTIONS = {
     "tall": "height", "high": "height", "height": "height", "wide": "width", "width": "width", "broad": "width",
     "diameter": "width", "across": "width", "long": "length", "length": "length", "deep": "depth", "thick": "height",
     "longest": "", "secondside": "second", "diagonal": "diagonal", "diagonally": "diagonal",
 }  # fmt: skip
-"""``second``: the second longest side, as of a tray of 30 x 20 cm; ``secondside`` is what ``in_figures`` makes of it."""
+"""``second`` is the second longest side, as of a tray of 30 x 20 cm; ``secondside`` is its form in ``in_figures``."""
 _NUMERALS = {
     "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10,
     "eleven": 11, "twelve": 12,
 }  # fmt: skip
 _SPELT = re.compile(rf"\b({'|'.join(_NUMERALS)})(?= (?:{_UNIT.replace('|in|', '|').replace('|m|', '|')})\b)")
-"""Numbers in words before a unit, but for 'in' and 'm': 'two in one' is no length."""
+"""Number words before a unit, except 'in' and 'm': 'two in one' is no length."""
 _SIGNS = {"½": "1/2", "¼": "1/4", "¾": "3/4", "⅓": "1/3", "⅔": "2/3", "⅛": "1/8", "⅜": "3/8", "⅝": "5/8", "⅞": "7/8"}
 _OF_AMOUNTS = r"[mcd]?l|lit(?:re|er)s?|fl\b.*|oz|ounces?|pints?|pt|quarts?|qts?|gallons?|gals?|k?g|lbs?|pounds?"
 _FRACTION = re.compile(rf"(?<![\w./])(?:(\d+) )?(\d{{1,3}})/(\d{{1,3}})(?= ?-?(?:{_UNIT}|{_OF_AMOUNTS})\b)")
@@ -71,44 +71,44 @@ _FEET_AND_INCHES = re.compile(rf"({_NUMBER}) ?(?:foot|feet|ft)\.? (?:and )?({_NU
 
 
 def lengths_in(text: str) -> dict[str, float]:
-    """Return the lengths (m) that a text states of the whole by their direction, '' for the longest."""
+    """Return the lengths (m) of the whole object stated in a text, by direction; '' is the longest side."""
     return lengths_of_whole(in_figures(text))
 
 
 def lengths_of_whole(plain: str) -> dict[str, float]:
-    """Return the lengths (m) of the whole that a text states, as ``in_figures`` writes it, by direction."""
+    """Return the lengths (m) of the whole object in a text in the form of ``in_figures``, by direction."""
     found = LENGTH.findall(without_lengths_of_parts(plain))
     return {DIRECTIONS.get(direction, ""): float(number) * _metres(unit) for number, unit, direction in found}
 
 
 def lengths_of_parts(plain: str) -> dict[str, float]:
-    """Return the lengths (m) that a text, as ``in_figures`` writes it, states of parts, by the words for these."""
+    """Return the lengths (m) of parts in a text in the form of ``in_figures``, by the part's word."""
     return {m[7]: float(m[3]) * _metres(m[4]) for m in _OF_A_PART.finditer(plain) if m[7] not in DIRECTIONS}
 
 
 def without_lengths_of_parts(plain: str) -> str:
-    """Return a text, as ``in_figures`` writes it, without the lengths of parts: 'with a blade'."""
+    """Return a text in the form of ``in_figures`` without the lengths of parts: 'with a blade'."""
     return _OF_A_PART.sub(lambda m: m[0] if m[7] in DIRECTIONS else f" {m[1]}{m[2]}{m[6]} {m[7]}", plain)
 
 
 def several_lengths(plain: str) -> bool:
-    """Tell whether a text, as ``in_figures`` writes it, states more than one length of one direction, or from which to which."""
+    """Return whether a text in the form of ``in_figures`` states several lengths of one direction, or a range."""
     plain = without_lengths_of_parts(plain)
     return len(LENGTH.findall(plain)) > len(lengths_of_whole(plain)) or _RANGE.search(plain) is not None
 
 
 def in_figures(text: str) -> str:
-    """Return the words in lower case with each length as one number, its unit and then what it is of: '14 inches long'.
+    """Return a text in lower case with each length as number, unit and direction: '14 inches long'.
 
-    A decimal comma is a point, marks of inches and feet are words, numbers and fractions are figures, feet and inches are one
-    length, and so is one that is said in two units: '12 in / 30 cm'.
+    Decimal commas become points, inch and foot marks become words, number words and fractions become figures. Feet with inches,
+    and a length stated in two units ('12 in / 30 cm'), become one length.
     """
     plain = re.sub(r"(?<=\d),(?=\d{3}\b)", "", text.lower())
     plain = re.sub(r"(?<=\d),(?=\d)", ".", plain)
     for sign, fraction in _SIGNS.items():
         plain = plain.replace(sign, f" {fraction}")
     plain = re.sub(r"(?<=\d) ?(?:\"|″|'')", " inches ", plain)
-    plain = re.sub(r"(?<=\d) ?(?:'|′)(?![a-z])", " ft ", plain)  # the 70's are no feet
+    plain = re.sub(r"(?<=\d) ?(?:'|′)(?![a-z])", " ft ", plain)  # but not "the 70's"
     plain = re.sub(r"(?<=\d)-(?=\d+/\d)", " ", plain)
     plain = _FRACTION.sub(_in_decimals, plain)
     plain = re.sub(r"[ø⌀]|\bdiam?\b\.?", " diameter ", plain)
@@ -130,7 +130,7 @@ def in_figures(text: str) -> str:
 
 
 def _with_letters(sides: Sequence[str | None], letters: Sequence[str | None]) -> str:
-    """Return numbers and their unit, each number with its letter before it: 'l30 x w20 x h10 cm'; '' for more of one kind."""
+    """Return numbers and unit with each number's letter before it: 'l30 x w20 x h10 cm'; '' if their counts differ."""
     *numbers, unit = sides
     if letters.count(None) != numbers.count(None):
         return ""
@@ -139,9 +139,9 @@ def _with_letters(sides: Sequence[str | None], letters: Sequence[str | None]) ->
 
 
 def _by_letter(found: re.Match[str]) -> str:
-    """Return sides that each have the letter of their direction with its word; as they are where one has none, or two the same.
+    """Return sides marked by letters with direction words; unchanged if a letter is missing or repeated.
 
-    D is the diameter where no width or length is beside it, else the depth.
+    D means the diameter if neither width nor length is given, else the depth.
     """
     sides = [found.groups()[at : at + 4] for at in (0, 4, 8) if found.groups()[at + 1]]
     letters = [before or behind for before, _, _, behind in sides]
@@ -154,14 +154,14 @@ def _by_letter(found: re.Match[str]) -> str:
 
 
 def _once(found: re.Match[str]) -> str:
-    """Return the first of two lengths in other units, where they are one length but for rounding; else both."""
+    """Return the first of two lengths that are equal up to rounding in different units; both otherwise."""
     first, second = (float(found[at]) * _metres(found[at + 1]) for at in (1, 3))
     same = found[2] != found[4] and abs(first - second) <= ROUNDED * max(first, second)
     return f"{found[1]} {found[2]}" if same else found[0]
 
 
 def _by_direction(found: re.Match[str]) -> str:
-    """Return three numbers as length, width and height, two as the longest side and the second; as they are without a unit."""
+    """Return three numbers as length, width and height, two as longest and second side; unchanged without a unit."""
     numbers, units = found.groups()[::2], found.groups()[1::2]
     *_, last = (unit for number, unit in zip(numbers, units, strict=True) if number)
     if last is None:

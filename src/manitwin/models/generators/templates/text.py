@@ -1,4 +1,4 @@
-"""Read what a sentence asks for: category, colours, materials, sizes; 'a red ceramic mug with a wooden handle, 9 cm tall'."""
+"""Parse an object description: category, colours, materials, sizes; 'a red ceramic mug with a wooden handle, 9 cm tall'."""
 
 from __future__ import annotations
 
@@ -46,15 +46,15 @@ from manitwin.models.generators.templates.told_parts import (
 
 MAX_CHARACTERS = 400
 _NEGATION = re.compile(r"\b(?:no(?!\.? ?\d)|not|without)\b")
-"""What no template can be told: left out in silence, the thing would be another one."""
+"""Negations are refused, since a template cannot express them and ignoring them would give another object."""
 _NEGATIVE = re.compile(r"(?:^|(?<=[^\d\W]) |(?<=[(,:]) ?)[-−]\.?\d[\d.]*")
-"""A minus before a number, behind a word, a bracket or a comma: behind a digit it parts a range, within a word it joins."""
+"""A minus sign before a number, after a word, bracket or comma; after a digit it is a range, within a word a hyphen."""
 _TOOL_HEADS = ("head", "blade")
 _COLORED_MATTER = {"plastic", "rubber"}
 _ONE_OF = re.compile(r"^(?:one|any|each|either) of (?:the|these|those|my|our) ")
 _SHAPED_LIKE = re.compile(r" (?:(?:that is )?shaped like|in the (?:shape|form) of|(?:that looks|looking) like) ")
 _NO_LENGTH = re.compile(r"#?\d[\d.]*(?:x\d[\d.]*)*")
-"""A number, or several with 'x' between them, that says nothing."""
+"""One or several numbers, joined by 'x', without a unit."""
 _NUMBERED = frozenset(
     {"no", "number", "nr", "model", "type", "version", "mark", "mk", "series", "vol", "volume", "route"}
 )
@@ -64,12 +64,13 @@ _WITH = re.compile(r" (?:(?:that|which|it|and) )?(?:with|having|featuring|whose|
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a text asks for: ``wishes`` by the name of a part, '' for the whole; ``lengths_m`` by direction, '' for the longest.
+    """A parsed description. ``wishes`` are keyed by part ('' for the whole), ``lengths_m`` by direction ('' for the longest
+    side).
 
-    ``relative`` is where in the category's interval of sizes it is, None where the text does not say; ``unused`` are the words
-    that say nothing to a template; ``part_lengths_m`` those of parts or slots, of each its longest side; ``amount`` is the
-    volume or the mass; ``measures`` are the template's that a named size gives, such as M8 x 40 of a bolt, and
-    ``nominal_m`` the size that such a tool is called by, a wrench by that of its nuts.
+    ``relative`` is the relative position in the category's size interval, None if not stated. ``unused`` are words without
+    meaning to a template. ``part_lengths_m`` are lengths of the longest sides of parts or slots. ``amount`` is the volume or
+    mass. ``measures`` are those of a standard size, such as an M8 x 40 bolt. ``nominal_m`` is the nominal size of a tool, such as
+    that of a wrench.
     """
 
     category: str
@@ -84,21 +85,21 @@ class Wanted:
 
     @property
     def solves_measures(self) -> bool:
-        """Whether one scale for the whole cannot give what is stated: several lengths, that of a part, a volume beside them."""
+        """Whether a uniform scale cannot meet the statements: several lengths, a part's length, or an amount besides a length."""
         beside = self.amount is not None or len(self.lengths_m) > 1
         return bool(self.part_lengths_m) or (bool(self.lengths_m) and beside)
 
     @property
     def scaling_amount(self) -> Amount | None:
-        """The volume or mass that sets the scale; None where lengths do, or nothing."""
+        """The volume or mass that determines the scale; None if lengths do, or nothing is stated."""
         return None if self.solves_measures else self.amount
 
 
 def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
-    """Return what a text asks for.
+    """Parse a description.
 
-    Raises UsageError where it names no category that there is a template of, or several, asks for several things, or says what
-    a template cannot be told.
+    Raises UsageError if it names no category of a template, or several, asks for several objects, or states something that a
+    template cannot express.
     """
     if len(text) > MAX_CHARACTERS:
         raise UsageError(f"a text of {len(text)} characters; at most {MAX_CHARACTERS} describe an object")
@@ -166,7 +167,7 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
 
 
 def _is_nominal(length_m: float, template: Template, prior: Prior) -> bool:
-    """Tell whether a length is what such a tool is called by: it is that of no whole one, and near such sizes."""
+    """Return whether a length is a tool's nominal size: too short for the whole object, and in the range of such sizes."""
     of_it = [template.measures[name] for name in template.nominal]
     low = template.nominal_times * math.prod(measure.low for measure in of_it) / MARGIN
     high = template.nominal_times * math.prod(measure.high for measure in of_it) * MARGIN
@@ -176,7 +177,7 @@ def _is_nominal(length_m: float, template: Template, prior: Prior) -> bool:
 def _diagonal(
     plain: str, lengths: dict[str, float], part_lengths: dict[str, float], template: Template, text: str
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return lengths of the whole and of parts, where a screen's is its diagonal: of a laptop of 15.6 inches."""
+    """Return the lengths of the whole and of parts, where a screen size in inches is a diagonal: a laptop of 15.6 inches."""
     if template.diagonal_of and not lengths and part_lengths.keys() == {template.diagonal_of}:
         return {"diagonal": part_lengths[template.diagonal_of]}, {}
     inches = all(unit in INCHES for _, unit, _ in LENGTH.findall(plain))
@@ -188,7 +189,7 @@ def _diagonal(
 
 
 def _lengths_beside(size: StandardSize | None, lengths: dict[str, float], text: str) -> dict[str, float]:
-    """Return the lengths that a text states, or a named size of it; raises UsageError where these contradict each other."""
+    """Return the lengths of a text or of its named size; raises UsageError if they contradict each other."""
     if size is None or not lengths:
         return lengths if size is None else dict(size.lengths_m)
     said, named = (sorted(each.values()) for each in (lengths, size.lengths_m))
@@ -200,7 +201,9 @@ def _lengths_beside(size: StandardSize | None, lengths: dict[str, float], text: 
 
 
 def _check_numbers(text: str, unused: list[str]) -> None:
-    """Raise UsageError for a number without a unit: it may be a size. Of '192 pages' and 'No. 2' it is told what it counts."""
+    """Raise UsageError for a number without a unit, which may be a size. Counts ('192 pages') and numbering ('No. 2') are
+    accepted.
+    """
     for at, word in enumerate(unused):
         counted = at + 1 < len(unused) and not any(character.isdigit() for character in unused[at + 1])
         counted = counted and unused[at + 1] != "x" and "x" not in word
@@ -212,7 +215,7 @@ def _check_numbers(text: str, unused: list[str]) -> None:
 
 
 def _slot_meant(wish: Wish, template: Template, prior: Prior) -> str | None:
-    """Return the part that a material before the name is of, where the thing is of several: of a wooden hammer the handle."""
+    """Return the slot that a material before the name of a composite object refers to: the handle of a wooden hammer."""
     if wish.material is None or not is_composite(prior):
         return None
     usual = {slot: {look_of(words).surface for words in choices if words} for slot, choices in template.slots.items()}
@@ -222,7 +225,7 @@ def _slot_meant(wish: Wish, template: Template, prior: Prior) -> str | None:
 
 
 def _slot_coated(wish: Wish, template: Template) -> str | None:
-    """Return the part that a colour of the whole is of, where nobody paints the whole: of a red hammer the handle."""
+    """Return the slot that a colour of the whole refers to if the head is bare metal: the handle of a red hammer."""
     if wish.rgb is None or wish.material is not None or wish.kind:
         return None
     usual = {slot: {look_of(words).surface for words in choices if words} for slot, choices in template.slots.items()}
@@ -233,7 +236,7 @@ def _slot_coated(wish: Wish, template: Template) -> str | None:
 
 
 def _joined(before: Described, own: Described, tail: Described) -> Described:
-    """Return what is said before a name, in it and behind it: of one thing, so that two colours contradict each other."""
+    """Return the combined meaning of the words before, in and after a name; raises UsageError for contradictions."""
     one, other = before.wish, tail.wish
     if one.rgb is not None and other.rgb is not None and one.rgb != other.rgb:
         raise UsageError("two colours for one object: state which part has which")
@@ -248,7 +251,7 @@ def _joined(before: Described, own: Described, tail: Described) -> Described:
 
 
 def _check_taken(text: str, plain: str) -> None:
-    """Raise UsageError for what a template cannot be told."""
+    """Raise UsageError for statements that a template cannot express."""
     if (below := _NEGATIVE.search(text)) is not None:
         raise UsageError(f"{text!r}: a negative length ({below[0].strip()!r}); state it without the sign")
     if (said := _NEGATION.search(plain)) is not None:
@@ -261,7 +264,7 @@ def _check_taken(text: str, plain: str) -> None:
 
 
 def _check_lengths(text: str, plain: str) -> None:
-    """Raise UsageError where more than one length of one side is stated."""
+    """Raise UsageError if several lengths of one side are stated."""
     if several_lengths(plain):
         raise UsageError(
             f"{text!r} states several lengths of one side, or from which to which one is; say one of each, such as '9 cm tall and"

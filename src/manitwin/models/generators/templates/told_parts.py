@@ -1,4 +1,4 @@
-"""What a text says of single parts: 'a red handle', 'red handled', 'blades 12 cm, handles red', 'yellow inside'."""
+"""Statements on single parts in a description: 'a red handle', 'red handled', 'blades 12 cm, handles red', 'yellow inside'."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ _PART_NAMES = {
     "blade": ("head",), "strap": ("band",), "display": ("screen",), "bristle": ("bristles",), "edge": ("rim",), "rim": ("frame",),
     "outside": ("body",), "exterior": ("body",), "interior": ("inside",),
 }  # fmt: skip
-"""Other words for slots of templates, the best first."""
+"""Synonyms of template slots, best match first."""
 _COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade", "knob", "spout", "strap", "base")
-"""Of which a text may speak, whether a thing has them or not."""
+"""Common parts that a text may mention whether or not the object has them."""
 _WITH = re.compile(r" (?:(?:, )?(?:and|that|which|it) )?(?:with|having|featuring|whose|has) ")
 MOST_PIECES = 8
-"""Between commas, in which the thing's name is looked for: who says more of it before has said its name."""
+"""Number of comma-separated pieces that are searched for the object's name."""
 _SOMEWHERE = re.compile(r" (?:in|on|at|near|around|along|under|above) the ")
 _PIECES = re.compile(r" ?[,;:] ")
 _ALONG = {"", "long", "length", "across", "diameter", "longest"}
-"""Directions that say the longest side of a part, which is the one that a part can be told."""
+"""Directions that mean the longest side of a part, the only length that a part can be given."""
 _BESIDE = frozenset(("are", "were", "each", "both", "length", "long", "size")) | FILLER_WORDS
 _ELSEWHERE = frozenset({"next", "inside", "on", "at", "for", "to", "by", "near", "under", "without"})
 
 
 def with_parts_told(plain: str, templates: Mapping[str, Template]) -> str:
-    """Return a text, as ``in_figures`` writes it, with what it says of parts behind the thing's name put behind 'with'.
+    """Return a text in the form of ``in_figures`` with statements on parts after the name moved behind 'with'.
 
-    'a screwdriver , shaft 15 cm , red handle' is 'a screwdriver with a 15 cm shaft and a red handle'. What stands behind a
-    length or an amount is parted as by a comma: 'a hammer 16 oz red handle'. Raises UsageError for a length of a part that is not
-    its longest side.
+    'a screwdriver , shaft 15 cm , red handle' becomes 'a screwdriver with a 15 cm shaft and a red handle'. Words after a length
+    or amount are treated as after a comma: 'a hammer 16 oz red handle'. Raises UsageError for a length of a part that is not its
+    longest side.
     """
     plain = _with_names_joined(plain, templates)
     main, *told = _WITH.split(plain, maxsplit=1)
@@ -73,7 +73,7 @@ def with_parts_told(plain: str, templates: Mapping[str, Template]) -> str:
 
 
 def _lengths_behind(told: list[str], template: Template) -> tuple[list[str], list[str]]:
-    """Return what is told behind 'with' without the lengths of further parts behind a comma, and these: ', blade 9 cm'."""
+    """Return the statements after 'with' without lengths of further parts after a comma, and these lengths: ', blade 9 cm'."""
     if not told:
         return told, []
     first, *pieces = _PIECES.split(told[0])
@@ -83,7 +83,7 @@ def _lengths_behind(told: list[str], template: Template) -> tuple[list[str], lis
 
 
 def _with_names_joined(plain: str, templates: Mapping[str, Template]) -> str:
-    """Return a text with names that say 'with' as their categories: of a cup with saucer the saucer is no part."""
+    """Return a text with names that contain 'with' replaced by their categories: the saucer of a cup with saucer is no part."""
     for template in templates.values():
         for name in template.names:
             if " with " in name:
@@ -92,7 +92,7 @@ def _with_names_joined(plain: str, templates: Mapping[str, Template]) -> str:
 
 
 def _is_of_something_else(piece: str) -> bool:
-    """Tell whether colours and materials of a piece are of what is named in it, which is no part: gold accents, black ink."""
+    """Return whether the colours of a piece belong to a noun that is no part: gold accents, black ink."""
     words = [word for word in plain_words(_without_numbers(piece).split()) if word not in FILLER_WORDS]
     if len(words) < 2 or is_described(words[-1]) or is_adjective(words[-1]) or not words[-1].isalpha():
         return False
@@ -100,7 +100,7 @@ def _is_of_something_else(piece: str) -> bool:
 
 
 def _parted(main: str, templates: Mapping[str, Template]) -> tuple[str, Template | None, list[str]]:
-    """Return the words up to the thing's name, its template (None where no words name one) and the pieces behind."""
+    """Return the words up to the object's name, its template (None if no words name one), and the pieces after it."""
     pieces = [piece for piece in _PIECES.split(main) if piece.strip()]
     for at in range(min(len(pieces), MOST_PIECES)):
         head = " , ".join(pieces[: at + 1])
@@ -116,7 +116,7 @@ def _parted(main: str, templates: Mapping[str, Template]) -> tuple[str, Template
 
 
 def _cut_behind_amounts(head: str) -> list[tuple[str, str]]:
-    """Return the words up to each amount and those behind it, where both are some."""
+    """Return the words up to and after each amount, where neither is empty."""
     cuts = []
     for amount in LENGTH.finditer(head):
         end = amount.end() if amount[3] in DIRECTIONS else amount.start(3)
@@ -131,7 +131,7 @@ def _cut_behind_amounts(head: str) -> list[tuple[str, str]]:
 
 
 def _ends(words: list[str]) -> bool:
-    """Tell whether words end with a volume or a mass."""
+    """Return whether words end with a volume or mass."""
     return any(without_amounts(" ".join(words[-count:])) == "" for count in (1, 2, 3) if count <= len(words))
 
 
@@ -140,7 +140,7 @@ def _without_numbers(text: str) -> str:
 
 
 def _of_part_in(phrase: str, template: Template) -> str | None:
-    """Return what a phrase says of a part as 'a 12 cm red handle'; None where it speaks of none, or says nothing of it."""
+    """Return a phrase on a part as 'a 12 cm red handle'; None if it names no part, or states nothing about it."""
     lengths = list(LENGTH.finditer(phrase))
     words = plain_words(LENGTH.sub(lambda m: "" if m[3] in DIRECTIONS else m[3], phrase).split())
     if len(lengths) > 1 or not _ELSEWHERE.isdisjoint(words[:1]):
@@ -166,7 +166,7 @@ def _of_part_in(phrase: str, template: Template) -> str | None:
 
 
 def _part_at(words: list[str], at: int, template: Template) -> tuple[str, list[str]] | None:
-    """Return the part that is called by the words that end with word ``at``, or begin with it, and the others."""
+    """Return the part named by the words that end with, or start at, word ``at``, and the other words."""
     for length in (2, 1):
         start = max(at - length + 1, 0) if at else 0
         called = " ".join(words[start : start + length])
@@ -178,7 +178,7 @@ def _part_at(words: list[str], at: int, template: Template) -> tuple[str, list[s
 
 
 def part_said(word: str, template: Template) -> str | None:
-    """Return the slot or the part that a word means, in the plural or by another name; None where it means none."""
+    """Return the slot or part that a word means, including plurals and synonyms; None if it means none."""
     names = [word, word.removesuffix("s"), f"{word}s"]
     names += [other for name in names[:2] for other in _PART_NAMES.get(name, ())]
     for known in (template.slots, _built_parts(template.build, tuple(template.typical().items()))):
@@ -193,7 +193,7 @@ def _built_parts(build: Builder, measures: tuple[tuple[str, float], ...]) -> fro
 
 
 def _adjective_of(word: str, template: Template) -> str | None:
-    """Return the part that a word such as 'handled' says something of; None for any other word."""
+    """Return the part that an adjective such as 'handled' refers to; None for any other word."""
     for name in (*template.slots, *_COMMON_PARTS):
         if word in (f"{name}d", f"{name}ed", f"{name}{name[-1]}ed", f"{name.removesuffix('s')}ed"):
             return slot_called(name, template)
@@ -201,7 +201,7 @@ def _adjective_of(word: str, template: Template) -> str | None:
 
 
 def part_before(words: list[str], template: Template) -> tuple[list[tuple[str, Described]], list[str]]:
-    """Return what is said of a part before the name ('a red handled hammer'), and the words that are left."""
+    """Return the statement on a part before the name ('a red handled hammer'), and the remaining words."""
     for at, word in enumerate(words):
         part = _adjective_of(word, template) or (word if word in template.slots else None)
         if part is not None and at:
@@ -210,14 +210,14 @@ def part_before(words: list[str], template: Template) -> tuple[list[tuple[str, D
 
 
 def slot_called(word: str, template: Template) -> str:
-    """Return the slot or the part that a word means, in the plural or by another name; else the word, in the singular."""
+    """Return the slot or part that a word means, including plurals and synonyms; else the word in the singular."""
     return part_said(word, template) or word.removesuffix("s")
 
 
 def features(text: str, template: Template) -> list[tuple[str, Described]]:
-    """Return what is said of each part behind 'with': 'a red handle, black head and green claw'.
+    """Return the statements on each part after 'with': 'a red handle, black head and green claw'.
 
-    A part that nothing is said of is as the one before it: of 'a red handle and lid' both are red.
+    A part without a statement has that of the previous part: in 'a red handle and lid', both are red.
     """
     found: list[tuple[str, Described]] = []
     before: list[str] = []
@@ -231,18 +231,18 @@ def features(text: str, template: Template) -> list[tuple[str, Described]]:
         if not words:
             continue
         names = [at for at, word in enumerate(words) if not is_described(word) or word in template.slots]
-        if not names and slot_called(words[-1], template) in template.slots:  # 'a cork' is a part, and of cork
+        if not names and slot_called(words[-1], template) in template.slots:  # 'a cork' is a part, made of cork
             found.append((slot_called(words[-1], template), of_part([*before, *words])))
             before = []
             continue
         if not names:
             before += [*words, "and"]  # 'red and white stripes'
             continue
-        at = names[-1]  # the last but for 'a handle in red'
+        at = names[-1]  # the last, except in 'a handle in red'
         said = of_part([*before, *words[:at], *words[at + 1 :]])
         found.append((slot_called(words[at], template), said if said != Described() or not found else found[-1][1]))
         before = []
-    if before and found and mark == ",":  # 'with a straw, pink': of the whole
+    if before and found and mark == ",":  # 'with a straw, pink': refers to the whole
         found.append(("", described(before[:-1])))
     elif before:
         raise UsageError(f"no part is named that is {' '.join(before[:-1])}")
@@ -253,9 +253,9 @@ def features(text: str, template: Template) -> list[tuple[str, Described]]:
 
 
 def shared_out(words: list[str], template: Template) -> tuple[list[tuple[str, Described]], list[str]]:
-    """Return which part has which of two colours that a thing is said to have, and the words that are left.
+    """Return which part has which of two stated colours, and the remaining words.
 
-    A black and white soccer ball is one whose parts usually have these; of others the colours stay where they are.
+    A black and white soccer ball has parts that usually have these colours; for other objects the words are unchanged.
     """
     usual = {slot: {look_of(each).rgb for each in choices if each} for slot, choices in template.slots.items()}
     for at in range(1, len(words) - 1):
@@ -270,7 +270,7 @@ def shared_out(words: list[str], template: Template) -> tuple[list[tuple[str, De
 
 
 def _joined_names(words: list[str], template: Template) -> list[str]:
-    """Return words with each slot's name of two words as one: the rear lamps are not the lamps."""
+    """Return words with the two words of a slot name joined: the rear lamps are not the lamps."""
     joined = list[str]()
     for word in words:
         if joined and (pair := f"{joined[-1]} {word}") in template.slots:
@@ -281,6 +281,6 @@ def _joined_names(words: list[str], template: Template) -> list[str]:
 
 
 def of_part(words: list[str]) -> Described:
-    """Return what words say of a part, whose size a template cannot be told."""
+    """Return the meaning of words on a part, whose relative size a template cannot express."""
     said = described([word for word in words if word not in RELATIVE])
     return Described(said.wish, None, (*said.unused, *(word for word in words if word in RELATIVE)))

@@ -1,4 +1,4 @@
-"""Words by what they do in a description: sizes, words that say nothing, and words behind which others are spoken of."""
+"""Word lists of descriptions: relative sizes, filler words, and words that introduce other objects."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 RELATIVE = {
     "tiny": 0.0, "small": 0.12, "little": 0.12, "mini": 0.0, "large": 0.88, "big": 0.88, "huge": 1.0, "giant": 1.0,
 }  # fmt: skip
-"""Where in the interval of a category's sizes a word puts a thing: 0 the least, 1 the largest."""
+"""Position in the category's size interval for a size word: 0 smallest, 1 largest."""
 FILLER_WORDS = frozenset(
     [
         "a",
@@ -53,11 +53,11 @@ FILLER_WORDS = frozenset(
         "my",
     ]
 )
-"""Words that say nothing themselves."""
+"""Words without meaning of their own."""
 PURPOSE = frozenset(
     ["for", "on", "inside", "holding", "containing", "filled", "full", "to", "by", "with", "having", "without"]
 )
-"""What is behind these says nothing of the thing itself: a brush for wood is not of it."""
+"""Words after which the text no longer describes the object: a brush for wood is not made of it."""
 PLACES = frozenset(
     [
         "next",
@@ -84,7 +84,7 @@ PLACES = frozenset(
         "nearest",
     ]
 )
-"""What is behind these, and a preposition or an article, is where the thing is: next to the stove, under a lamp."""
+"""Words that, followed by a preposition or article, introduce a location: next to the stove, under a lamp."""
 _OF_A_PLACE = frozenset(
     [
         "a",
@@ -114,11 +114,13 @@ _OF_A_PLACE = frozenset(
 CONTENTS = frozenset(
     ["soap", "wax", "paper", "clay", "cloth", "fabric", "cream", "mustard", "mint", "lime", "olive", "peach"]
 )
-"""Materials and colours that behind 'of' are what is in a thing: a bottle of soap."""
+"""Materials and colours that are contents after 'of': a bottle of soap."""
 
 
 def speaks_of_others(words: Sequence[str], at: int) -> bool:
-    """Tell whether what is behind a word speaks of other things: not behind 'full' in a half full glass, a stapler full strip."""
+    """Return whether the text after a word describes other objects; 'full' only does before 'of' or 'with' (not in 'half full
+    glass').
+    """
     behind = words[at + 1] if at + 1 < len(words) else ""
     if words[at] in ("full", "filled"):
         return behind in ("of", "with")

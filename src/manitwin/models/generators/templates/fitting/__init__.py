@@ -1,1 +1,1 @@
-"""Fit templates to photos: see ``fit``."""
+"""Fit templates to photos: measures and camera views by least squares on silhouettes, and textures from the photos."""

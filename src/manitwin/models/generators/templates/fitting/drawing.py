@@ -1,7 +1,7 @@
-"""Small pictures of triangle meshes without a graphics device: silhouettes, and which face is seen where.
+"""Small software renderer for triangle meshes: silhouettes, and the visible face at each pixel.
 
-Faces that look away are left out, the others are painted from the farthest to the nearest (the painter's algorithm by the
-faces' centres: right for the small, closed triangles of templates but for slivers at edges).
+Back faces are culled, the others are painted from far to near (painter's algorithm by face centres). For the small, closed
+triangles of templates this is correct except for slivers at edges.
 """
 
 from __future__ import annotations
@@ -9,37 +9,39 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-_SHIFT = 4  # OpenCV's fixed point: sixteenths of a pixel
+_SHIFT = 4  # OpenCV fixed point: sixteenths of a pixel
 
 
 def to_pixels(flat: np.ndarray, side_px: int, box_share: float) -> np.ndarray:
-    """Return pixel coordinates ``(N, 2)`` of places in the photo frame, in a square picture of which the box fills a share."""
+    """Return pixel coordinates ``(N, 2)`` of photo-frame positions in a square image in which the object's box fills
+    ``box_share``.
+    """
     return np.asarray(flat * (box_share * side_px) + (side_px - 1) / 2)
 
 
 def facing(pixels: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return which faces ``(F, 3)`` of projected vertices ``(V, 2)``, wound outward, look at the camera."""
+    """Return which outward-oriented faces ``(F, 3)`` of projected vertices ``(V, 2)`` face the camera."""
     x, y = pixels.T.copy()
     a, b, c = faces.T
     x_a, y_a = x[a], y[a]
-    # y runs downward: what is counter-clockwise in the world is clockwise here
+    # y points down: counter-clockwise in the world is clockwise here.
     return np.asarray((x[b] - x_a) * (y[c] - y_a) - (y[b] - y_a) * (x[c] - x_a) < 0)
 
 
 def edges_between(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the edges ``(E, 2)`` of a closed mesh and the faces ``(E, 2)`` at them; an edge runs as in the first of them."""
+    """Return the edges ``(E, 2)`` of a closed mesh and their two faces ``(E, 2)``; an edge is directed as in the first face."""
     ends = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     key = ends.min(axis=1) * (int(faces.max()) + 1) + ends.max(axis=1)
     order = np.argsort(key, kind="stable")
-    first, second = order[0::2], order[1::2]  # every edge of a closed mesh is there twice
+    first, second = order[0::2], order[1::2]  # every edge of a closed mesh occurs twice
     return ends[first], np.column_stack([first // 3, second // 3])
 
 
 def silhouette(pixels: np.ndarray, faces: np.ndarray, edges: tuple[np.ndarray, np.ndarray], side_px: int) -> np.ndarray:
-    """Return the mask ``(side, side) uint8`` of a closed mesh whose vertices lie at ``pixels (V, 2)``.
+    """Return the silhouette mask ``(side, side) uint8`` of a closed mesh with vertices at ``pixels (V, 2)``.
 
-    A pixel is in it about which the contour, the edges between faces that look here and faces that look away, winds at least
-    once: the winding number is the count of layers that face the camera. It is summed along the rows.
+    The occluding contour consists of edges between front and back faces. Its winding number about a pixel, accumulated along
+    rows, is the number of front-facing layers; the mask has the pixels where it is not zero.
     """
     ends, beside = edges
     front = facing(pixels, faces)
@@ -69,7 +71,7 @@ def silhouette(pixels: np.ndarray, faces: np.ndarray, edges: tuple[np.ndarray, n
 
 
 def seen_faces(pixels: np.ndarray, distance: np.ndarray, faces: np.ndarray, side_px: int) -> np.ndarray:
-    """Return the face that is seen at each pixel, ``(side, side) int32``, -1 where none is."""
+    """Return the visible face at each pixel, ``(side, side) int32``, -1 for background."""
     picture = np.full((side_px, side_px), -1, np.int32)
     front = np.nonzero(facing(pixels, faces))[0]
     order = front[np.argsort(-distance[faces[front]].mean(axis=1), kind="stable")]

@@ -1,4 +1,4 @@
-"""What a matted photo says of a shape: its mask, the signed distance to its outline, its inner edges and its colours."""
+"""Image evidence of a matted photo: mask, signed distance to the silhouette contour, inner edges and colours."""
 
 from __future__ import annotations
 
@@ -9,31 +9,35 @@ import numpy as np
 
 SIDE_PX = 112
 FINE = 2
-"""How many times finer outlines are drawn than colours: the fit follows differences of less than a pixel."""
+"""Oversampling of silhouettes relative to colours, so that the fit resolves differences of less than a pixel."""
 BOX_SHARE = 0.82
-"""How much of the small picture the object's box fills: what is larger than the photo says is seen beyond it."""
+"""Share of the image that the object's box fills; the margin shows a solid that is larger than the photo's object."""
 REACH = 0.06
-"""Of the picture's side: distances to the outline are told up to here."""
+"""Truncation of the signed distance, as a share of the image side."""
 LARGEST_PERFORATION = 0.008
-"""Of a mask's area: larger holes, between a handle and a bowl, are compared also where a thing is perforated."""
-_RIM_PX = 3  # the outline's own gradient is no inner edge
-_EDGE_LAB = 14.0  # a gradient of this many units of Lab a pixel, after smoothing, is half an edge
+"""Maximum area of an ignored hole of a perforated object, as a share of the mask; larger holes, as in a handle, are compared."""
+_RIM_PX = 3  # excludes the gradient of the contour itself
+_EDGE_LAB = 14.0  # smoothed gradient in Lab units per pixel that counts as half an edge
 _DIAGONAL_35MM = 43.27
 TYPICAL_FOCAL_MM, FOCAL_SPREAD = 36.0, 0.45
-"""The lens of phones and cameras as 35 mm equivalent, and the standard deviation of its logarithm: 26 to 80 mm are usual."""
+"""Typical focal length of phones and cameras (35 mm equivalent), and the standard deviation of its logarithm: 26 to 80 mm are
+usual.
+"""
 KNOWN_FOCAL_SPREAD = 0.2
-"""The same where the lens is known: how far the box of a thing is from 1.6 of its half diagonals."""
+"""The same for a known lens: the uncertainty of the ratio 1.6 between box size and half diagonal."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """A photo's object in a square picture ``SIDE_PX`` wide.
+    """A photo's object in a square image of side ``SIDE_PX``.
 
-    ``mask (S, S) bool``; ``outline`` the signed distance to its outline over the reach, in -1..1, positive inside;
-    ``filled_mask`` and ``filled_outline`` the same without small holes, for what is perforated;
-    ``edge (S, S)`` how much of an inner edge lies at each pixel or next to it, 0..1; ``lab (S, S, 3) float32``; ``inner (S, S)
-    bool`` well inside; ``perspective`` the object's size over its distance for the known or a usual lens, ``focal_spread`` the
-    standard deviation of its logarithm; ``center_px`` and ``box_px`` the box in the photo: its centre (x, y) and its longer side.
+    - ``mask (S, S) bool``; ``outline`` is the truncated signed distance to its contour in -1..1, positive inside.
+    - ``filled_mask`` and ``filled_outline``: the same without small holes, for perforated objects.
+    - ``edge (S, S)``: strength of inner edges at or next to each pixel, 0..1.
+    - ``lab (S, S, 3) float32``: colours; ``inner (S, S) bool``: pixels well inside the mask.
+    - ``perspective``: object size over distance for the known or a usual lens; ``focal_spread``: standard deviation of its
+      logarithm.
+    - ``center_px`` and ``box_px``: centre (x, y) and longer side of the object's box in the photo.
     """
 
     mask: np.ndarray
@@ -49,12 +53,16 @@ class Evidence:
     box_px: float
 
     def compared_with(self, *, perforated: bool) -> Evidence:
-        """Return what a drawn solid is compared with: without small holes where it is perforated, as its own are left out."""
+        """Return the evidence to compare a solid with; a perforated solid is drawn without small holes, so they are filled here
+        too.
+        """
         return replace(self, mask=self.filled_mask, outline=self.filled_outline) if perforated else self
 
 
 def evidence_of(rgba: np.ndarray, focal_mm: float | None = None) -> Evidence:
-    """Return what ``rgba (H, W, 4) uint8`` says, whose alpha is the object's mask; ``focal_mm`` is 35 mm equivalent, if known."""
+    """Return the evidence of ``rgba (H, W, 4) uint8`` with the object's mask as alpha; ``focal_mm`` is 35 mm equivalent, if
+    known.
+    """
     solid = rgba[..., 3] > 127
     rows, columns = np.nonzero(solid.any(axis=1))[0], np.nonzero(solid.any(axis=0))[0]
     height, width = float(rows[-1] - rows[0] + 1), float(columns[-1] - columns[0] + 1)
@@ -83,9 +91,9 @@ def evidence_of(rgba: np.ndarray, focal_mm: float | None = None) -> Evidence:
 
 
 def signed_distance(mask: np.ndarray) -> np.ndarray:
-    """Return the distance to a finely drawn outline over the reach, cut to -1..1, positive inside, at every other pixel.
+    """Return the truncated signed distance to the contour of an oversampled mask, in -1..1, positive inside, at image resolution.
 
-    It is worked out within the reach of the mask's box: what is further out is -1.
+    It is computed only near the mask's box; pixels farther away are -1.
     """
     step, reach = 2 * FINE, REACH * mask.shape[0]
     found = np.full([len(range(1, side, step)) for side in mask.shape], -1.0, np.float32)
@@ -94,7 +102,7 @@ def signed_distance(mask: np.ndarray) -> np.ndarray:
     if not width:
         return found
     away_px = int(reach) + 2
-    # the first row and column are multiples of the step
+    # The first row and column are multiples of the step.
     first_row, first_column = (max(0, (first - away_px) // step * step) for first in (top, left))
     inside = np.ascontiguousarray(inside[first_row : top + height + away_px, first_column : left + width + away_px])
     depth, beyond = (cv2.distanceTransform(each, cv2.DIST_L2, 3)[1::step, 1::step] for each in (inside, 1 - inside))
@@ -105,7 +113,9 @@ def signed_distance(mask: np.ndarray) -> np.ndarray:
 
 
 def without_small_holes(mask: np.ndarray) -> np.ndarray:
-    """Return a mask ``(H, W) bool`` with holes of up to ``LARGEST_PERFORATION`` of its area filled; itself where it has none."""
+    """Return a mask ``(H, W) bool`` with holes of up to ``LARGEST_PERFORATION`` of its area filled; the mask itself if it has
+    none.
+    """
     count, labels, stats, _ = cv2.connectedComponentsWithStats((~mask).astype(np.uint8), connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] <= LARGEST_PERFORATION * mask.sum()
     small[0] = False  # the mask itself
@@ -120,13 +130,13 @@ def _largest(mask: np.ndarray) -> np.ndarray:
 
 
 def _crop(rgba: np.ndarray, center: tuple[float, float], box_px: float, side_px: int) -> np.ndarray:
-    """Return the object's square of the photo ``(side, side, 4) float32``, colours of the object only."""
+    """Return the object's square of the photo ``(side, side, 4) float32`` with colours of the object only."""
     half = 0.5 * box_px / BOX_SHARE
     left, top = max(0, int(center[0] - half) - 2), max(0, int(center[1] - half) - 2)
     picture = rgba[top : int(center[1] + half) + 3, left : int(center[0] + half) + 3].astype(np.float32)
     picture[..., :3] *= picture[..., 3:] / 255
     scale = BOX_SHARE * side_px / box_px
-    shrunk = min(1.0, 1.5 * scale)  # first by averages, then by samples between them
+    shrunk = min(1.0, 1.5 * scale)  # area averaging first, then interpolation
     if shrunk < 1:
         size = (max(1, round(picture.shape[1] * shrunk)), max(1, round(picture.shape[0] * shrunk)))
         ratio = np.array(size, dtype=float) / np.array(picture.shape[1::-1], dtype=float)

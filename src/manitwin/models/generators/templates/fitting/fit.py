@@ -1,4 +1,4 @@
-"""Fit a template to a matted photo: its measures and the camera's view from outline, inner edges and shading."""
+"""Fit a template to a matted photo: measures and camera view from silhouette, inner edges and shading."""
 
 from __future__ import annotations
 
@@ -30,19 +30,23 @@ from manitwin.models.generators.templates.vocabulary import FILLER_WORDS
 _MOST_KINDS, _SIZE_MARGIN = 8, 1.5
 LEAST_CONFIDENCE = 0.5
 LEAST_AGAINST_INFLATION = 0.12
-"""A doubtful template is nearer to the truth than an inflated outline: of rendered photos of things bent by 16 % of their size, 6
-of 6 (volumetric IoU 0.37 to 0.83 against 0 to 0.34). 98 of 100 right names are above, 23 of 100 wrong ones."""
+"""A doubtful template is closer to the truth than an inflated silhouette: for rendered photos of objects deformed by 16 % of
+their size, in 6 of 6 cases (volumetric IoU 0.37 to 0.83 against 0 to 0.34). Confidence exceeds this value for 98 of 100 correct
+names and 23 of 100 wrong ones.
+"""
 LEAST_IOU, MOST_OUTLINE = 0.70, 0.0085
-"""92 of 100 rendered photos under the right name are within both, 14 of 100 under a wrong one; half of them bent by 8 %."""
+"""92 of 100 rendered photos with the correct name are within both limits, 14 of 100 with a wrong one; half of them are deformed
+by 8 %.
+"""
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A template with the measures that explain a photo best, and the view that it is seen from.
+    """A template with the measures and view that explain a photo best.
 
-    ``made`` is the solid with its parts in the object frame; a photo tells no size, so its longest side is the usual one of its
-    category, and its looks are the first ones of the template. ``confidence`` is in 0..1, 0.5 where a fit is as likely wrong as
-    right; ``center_px`` and ``box_px`` say where the photo frame of ``view`` lies in the photo.
+    ``made`` is the solid with its parts in the object frame. A photo does not determine the size: the longest side is the typical
+    one of the category. The looks are the template's first ones. ``confidence`` is in 0..1, 0.5 if the fit is as likely wrong as
+    right. ``center_px`` and ``box_px`` place the photo frame of ``view`` in the photo.
     """
 
     category: str
@@ -56,10 +60,10 @@ class Fitted:
 
 
 def template_for(name: str | None) -> Template | None:
-    """Return the template of what a thing is called, by its own names and by those of the priors; None where there is none.
+    """Return the template for a name, by the template's names and those of the priors; None if there is none.
 
-    Of a longer name its last words count where they are such a name of two words and more: a pink storage tray is a storage tray.
-    Closed packages look like what the priors have them beside: a carton of cream like one of milk.
+    The last two or more words of a longer name suffice: a pink storage tray is a storage tray. Closed packages use the template
+    of their kin in the priors: a carton of cream looks like one of milk.
     """
     templates = load_templates()
     words = " ".join((name or "").lower().replace("_", " ").replace("-", " ").split())
@@ -78,14 +82,13 @@ def template_for(name: str | None) -> Template | None:
 
 
 def kinds_of(category: str, name: str | None = None) -> list[str]:
-    """Return the categories that people may mean by a category's name: a can may be a drink can, a water bottle a bottle.
+    """Return the other categories that a category's name may mean: a can may be a drink can, a water bottle a bottle.
 
-    They share its last word, or the priors have them beside it, a mallet beside the hammer, and are about as large: nobody calls
-    a watering can a can. A plain name stands also for what has a name with that last word, a mug that is called a coffee cup, and
-    for that with something, a cup and saucer; but for what keeps things in it or not as its own things do: no glass is a
-    magnifying glass. A longer ``name`` of the category by which a thing is called says which of what stands beside another it
-    is: a hat may be a cap, and a sun hat is none. All boxes have the outline of a box, so that it does not tell one that is
-    called by what it keeps from another: a box of pencils, or a light bulb box, is no tissue box.
+    Candidates share its last word, or are its kin in the priors (mallet and hammer), and have a similar size: a watering can is
+    no can. A plain name also stands for categories with names that end in it (a mug called coffee cup) or combine it (cup and
+    saucer), but only if both or neither are containers: a glass is no magnifying glass. A more specific ``name`` excludes kin: a
+    hat may be a cap, a sun hat is not. Since all boxes have the silhouette of a box, a box named by its contents, such as a light
+    bulb box, has no alternatives.
     """
     templates, last = load_templates(), category.split()[-1]
     said = lookup(category)
@@ -104,13 +107,13 @@ def kinds_of(category: str, name: str | None = None) -> list[str]:
 
 
 def _says_which(name: str | None, category: str) -> bool:
-    """Tell whether a name is found by one that has the category's and a word before it: a claw hammer."""
+    """Return whether a name is more specific than the category: a claw hammer."""
     found = found_by(name)
     return found is not None and found[1].endswith(f" {category}")
 
 
 def _says_contents(name: str | None) -> bool:
-    """Tell whether a name has a noun before the one by which it is found, or 'of' behind it: a spark plug box."""
+    """Return whether a name states contents, by a noun before the known name or by 'of': a spark plug box."""
     found, words = found_by(name), (name or "").lower().replace("_", " ").replace("-", " ").split()
     if found is None:
         return False
@@ -119,7 +122,7 @@ def _says_contents(name: str | None) -> bool:
 
 
 def _heads(template: Template) -> set[str]:
-    """Return the words that say in each of a template's names what it is, before what it comes with."""
+    """Return the head nouns of a template's names, ignoring accessories after 'and' or 'with'."""
     return {name.split(" and ")[0].split(" with ")[0].split()[-1] for name in (template.category, *template.names)}
 
 
@@ -136,12 +139,12 @@ def fit(
     or_of: Sequence[str] = (),
     focal_mm: float | None = None,
 ) -> Fitted | None:
-    """Fit the template of a category to ``rgba (H, W, 4) uint8``, whose alpha is the object's mask.
+    """Fit the template of a category to ``rgba (H, W, 4) uint8`` with the object's mask as alpha.
 
-    ``initial_measures`` are expected in place of the usual ones. ``or_of`` are other categories, taken where they explain the
-    photo clearly better; they are searched from fewer views, so the one that comes nearest and is not believed is searched once
-    more, by itself. ``focal_mm`` is the lens as 35 mm equivalent where it is known. None where no measures near the expected
-    ones give a solid. Raises KeyError for a category without a template.
+    ``initial_measures`` replace the typical values as prior mean. ``or_of`` are alternative categories, chosen if they explain
+    the photo clearly better. They are searched from fewer views, so a best but doubtful alternative is searched again by itself.
+    ``focal_mm`` is the focal length (35 mm equivalent), if known. Returns None if no measures near the expected ones give a
+    solid. Raises KeyError for a category without a template.
     """
     templates = load_templates()
     evidence = evidence_of(rgba, focal_mm)
@@ -154,7 +157,7 @@ def fit(
 
 
 def first_built(candidates: Iterable[Candidate], evidence: Evidence) -> Fitted | None:
-    """Return the first candidate whose measures give a solid, as found in a photo; None where none do."""
+    """Return the first candidate whose measures give a solid, as a fit of the photo; None if there is none."""
     for best in candidates:
         try:
             made = made_of(best.family.template, best.family.measures(best.spreads))
@@ -165,7 +168,7 @@ def first_built(candidates: Iterable[Candidate], evidence: Evidence) -> Fitted |
 
 
 def fitted(made: Made, placed: Placed, left: Residual, evidence: Evidence) -> Fitted:
-    """Return what a fit found of one photo."""
+    """Return the fit of one photo."""
     return Fitted(
         category=made.category,
         made=made,
@@ -179,13 +182,13 @@ def fitted(made: Made, placed: Placed, left: Residual, evidence: Evidence) -> Fi
 
 
 def confidence_of(residual: Residual) -> float:
-    """Return how likely a fit is that of the right kind of thing: the worse of overlap and of the outlines' distance."""
+    """Return the probability that a fit is of the right category, from the worse of overlap and contour distance."""
     score = min((residual.iou - LEAST_IOU) / 0.03, (MOST_OUTLINE - residual.outline) / 0.0015)
     return float(1 / (1 + np.exp(-score)))
 
 
 def made_of(template: Template, measures: dict[str, float]) -> Made:
-    """Return a template with these measures and its first looks, its longest side the usual one of its category."""
+    """Return a template with these measures and its first looks, scaled to the typical longest side of its category."""
     looks: dict[str, Look] = {}
     for slot, choices in template.slots.items():
         looks[slot] = look_of(choices[0]) if choices[0] else looks[next(iter(template.slots))]

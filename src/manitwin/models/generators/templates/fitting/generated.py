@@ -1,4 +1,4 @@
-"""A fitted template as what a generator gives: its textured mesh, what it knows, and how sure it is."""
+"""A fitted template as the result of a generator: textured mesh, known annotations, and confidence."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from manitwin.twin.import_record import FITTED, ImportRecord
 
 
 def with_its_front_seen(fitted: Fitted) -> Fitted:
-    """Return a fit of a thing that has no front of its own, where it stands, turned until what the photo shows is towards -Y."""
+    """Return the fit of an upright object without a natural front, rotated so that its visible side is towards -Y."""
     if not load_templates()[fitted.category].any_front or not fitted.upright:
         return fitted
     made, yaw_rad = fitted.made, fitted.view.yaw_rad
@@ -41,7 +41,7 @@ def with_its_front_seen(fitted: Fitted) -> Fitted:
 
 
 def texture_of(fitted: Sequence[Fitted], photos: Sequence[np.ndarray]) -> Textured:
-    """Return the solid that was fitted to photos ``(H, W, 4) uint8`` with each of them on what it shows best."""
+    """Return the solid fitted to photos ``(H, W, 4) uint8``, textured from the photo that shows each face best."""
     made = fitted[0].made
     colours = {part: look.rgb for part, look in made.looks.items()}
     shots = [Shot(fit.view, rgba, fit.center_px, fit.box_px) for fit, rgba in zip(fitted, photos, strict=True)]
@@ -58,9 +58,9 @@ def visual_part(surface: Textured) -> trimesh.Trimesh:
 
 
 def known_of_fitted(fitted: Fitted, name: str, surface: Textured) -> ImportRecord:
-    """Return what is known of a fitted thing with its texture: its category, parts and functional points.
+    """Return the import record of a fitted object with its texture: category, parts and functional points.
 
-    Its mass is not: a photo tells neither size nor matter.
+    The mass is omitted, since a photo determines neither size nor material.
     """
     known = known_of(fitted.made, name)
     return known.model_copy(

@@ -1,7 +1,7 @@
-"""Measures and views of the least sum of squares between the outlines of a solid and those of photos.
+"""Least squares fit of measures and views to the silhouettes of photos.
 
-The outlines' signed distances are matched by the method of Levenberg (1944) and Marquardt (1963). The measures' intervals, the
-upright camera and the usual lens are weak priors.
+Truncated signed distances to the contours are matched by the method of Levenberg (1944) and Marquardt (1963). The measures'
+intervals, the upright camera and the usual lens are weak priors.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from manitwin.models.generators.templates.fitting.shape import MOST_SPREADS, Coa
 from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View
 
 _UPRIGHT_ROLL_RAD, _FREE_ROLL_RAD = np.radians(6.0), np.radians(60.0)
-_PRIOR = 0.15  # weight of one standard deviation of a prior, in the outline's residual
+_PRIOR = 0.15  # weight of one standard deviation of a prior, in units of the contour residual
 _FIRST_DAMPING, _LEAST_DAMPING = 0.02, 1e-3
 _TRIES = 4
 ENOUGH = 0.98
 _KEPT_ROUNDS = 3
-# steps of a pixel or two: shorter ones would follow the corners of pixels
+# Steps of a pixel or two; shorter ones would follow the pixel grid.
 _SPREAD_STEP = 0.35
 _POSE_STEPS = (0.06, 0.06, 0.03, 0.3, 0.015, 0.01, 0.01)
 _POSE = len(_POSE_STEPS)
@@ -30,17 +30,17 @@ _POSE = len(_POSE_STEPS)
 
 @dataclass(frozen=True)
 class Placed:
-    """A view of a photo; ``upright``: the camera was not rolled, so that its roll is near zero."""
+    """A view of a photo; ``upright`` means that the camera was not rolled, so that its roll is near zero."""
 
     view: View
     upright: bool
 
 
 class Problem:
-    """The least squares problem of one family of shapes and one or several photos of the same thing."""
+    """Least squares problem of one family of shapes and one or several photos of the same object."""
 
     def __init__(self, family: Family, evidences: Sequence[Evidence], turns: bool):
-        """Take the family, what the photos say, and whether a turn about the upright axis changes no outline."""
+        """Take the family, the evidence of the photos, and whether a rotation about the vertical changes no silhouette."""
         self._family, self._evidences, self._turns = family, list(evidences), turns
         usual = [np.clip(each.perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE) for each in evidences]
         self._usual = [float(np.log(perspective)) for perspective in usual]
@@ -48,9 +48,9 @@ class Problem:
     def solve(
         self, spreads: np.ndarray, placed: Sequence[Placed], *, measures: bool, rounds: int, enough: float = ENOUGH
     ) -> tuple[np.ndarray, list[Placed]]:
-        """Return measures (left as they are unless ``measures``) and a view of each photo, from the start given.
+        """Return measures (unchanged unless ``measures``) and a view per photo, starting from the given ones.
 
-        There are at most so many rounds; it ends with one that leaves more than ``enough`` of the squares before.
+        Stops after ``rounds`` iterations, or after one that leaves more than ``enough`` of the previous sum of squares.
         """
         solid = self._family.solid(spreads)
         if solid is None:
@@ -82,7 +82,7 @@ class Problem:
 
 
 class _State:
-    """The residuals of a problem about one start, and their derivatives."""
+    """The residuals of a problem near one starting point, and their derivatives."""
 
     def __init__(self, problem: Problem, spreads: np.ndarray, placed: Sequence[Placed], count: int):
         self._problem, self._spreads, self._count = problem, spreads, count
@@ -99,9 +99,10 @@ class _State:
         return np.concatenate([*blocks, _PRIOR * at[: self._count]])
 
     def derive(self, jacobian: np.ndarray, at: np.ndarray, solid: CoarseSolid, number: int) -> None:
-        """Fill in central differences; a pose changes its own photo's residuals only."""
+        """Fill in the Jacobian by central differences; a pose only affects the residuals of its own photo."""
         for k in range(self._count):
-            # a build costs ten times a picture: the column of a measure that changes the faces is kept a while
+            # Building a solid costs ten times as much as drawing it: columns of measures that change the faces are reused for
+            # some rounds.
             if self._moves[k] is not None or number % _KEPT_ROUNDS == 0:
                 sides = [self._beside(at, solid, k, side) for side in (0, 1)]
                 if sides[0] is not None and sides[1] is not None:

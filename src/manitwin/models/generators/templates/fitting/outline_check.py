@@ -1,4 +1,4 @@
-"""Tell whether a cut-out has the outline of a template: evidence for a mask that comes from none of the photo's colours."""
+"""Check whether a matte has the silhouette of a template, as evidence independent of the photo's colours."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from manitwin.models.generators.templates.fitting.fit import fit, kinds_of, template_for
 
 MOST_OUTLINE, LEAST_IOU = 0.001, 0.9
-"""The mean distance of the outlines, of the box's side, and the overlap of the areas."""
+"""Limits on the mean contour distance, relative to the box side, and on the overlap."""
 
 
 def template_outline_check(name: str | None, focal_mm: float | None = None) -> Callable[[np.ndarray], bool] | None:
-    """Return what tells of a cut-out ``rgba (H, W, 4) uint8`` whether its outline is that of a template of this name.
+    """Return a function that checks whether a matte ``rgba (H, W, 4) uint8`` has the silhouette of the named template.
 
-    ``focal_mm`` is the lens as 35 mm equivalent where it is known. None where there is no template of that name.
+    ``focal_mm`` is the focal length (35 mm equivalent), if known. Returns None if there is no template of that name.
     """
     template = template_for(name)
     if template is None:

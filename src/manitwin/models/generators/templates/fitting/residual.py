@@ -1,4 +1,4 @@
-"""How far a drawn solid is from a photo: outline, inner edges, shading and colours of its parts."""
+"""Residual between a drawn solid and a photo: silhouette, inner edges, shading and part colours."""
 
 from __future__ import annotations
 
@@ -19,20 +19,23 @@ from manitwin.models.generators.templates.fitting.evidence import (
 from manitwin.models.generators.templates.fitting.shape import CoarseSolid
 from manitwin.models.generators.templates.fitting.view import View
 
-_CREASE_COSINE = 0.82  # neighbouring pixels whose normals differ by more than 35 degrees have an edge between them
+_CREASE_COSINE = 0.82  # neighbouring pixels with normals more than 35 degrees apart form an edge
 _LEAST_EDGE_PX = 12
 _LEAST_SEEN_PX = 4
-_INWARD = frozenset({"inside", "base", "underside", "foot", "holes"})  # hidden as a rule
+_INWARD = frozenset({"inside", "base", "underside", "foot", "holes"})  # parts that are usually hidden
 _RIDGE = 2.0
 _LIGHTNESS_SHARE = 0.7
 
 
 @dataclass(frozen=True)
 class Residual:
-    """How a solid and a photo disagree: 1 - ``iou`` and ``outline`` (mean distance of both outlines over the object's longer
-    side) of the silhouettes; ``edges`` the share of the solid's inner edges where the photo has none; ``shading`` the share of
-    the colours' variance that normals and parts do not explain. ``hidden`` is the share of the surface in parts of
-    which nothing is seen: what has no trace in the photo is less likely there. ``edge_px`` counts inner edge pixels.
+    """Residual between a solid and a photo.
+
+    - ``iou`` and ``outline``: silhouette overlap, and mean distance of both contours over the object's longer side.
+    - ``edges``: share of the solid's inner edges without an edge in the photo.
+    - ``shading``: share of the colour variation not explained by normals and parts.
+    - ``hidden``: share of the surface in invisible parts, since a part without any trace in the photo is less likely.
+    - ``edge_px``: number of inner edge pixels.
     """
 
     iou: float
@@ -44,7 +47,7 @@ class Residual:
 
     @property
     def outline_cost(self) -> float:
-        """The part of ``cost`` that outlines and edges have."""
+        """The silhouette and edge terms of ``cost``."""
         return (1 - self.iou) + 6.0 * self.outline + 0.10 * self.edges
 
     @property
@@ -54,7 +57,7 @@ class Residual:
 
 
 def outline_difference(solid: CoarseSolid, view: View, evidence: Evidence) -> np.ndarray:
-    """Return the differences of signed distances ``(N,)`` to both outlines, of whose squares the fit makes the least."""
+    """Return the differences ``(N,)`` of the signed distances to both contours, the residual vector of the fit."""
     flat, _ = view.project(solid.vertices)
     drawn = silhouette(to_pixels(flat, FINE * SIDE_PX, BOX_SHARE), solid.faces, solid.edges, FINE * SIDE_PX)
     seen = evidence.compared_with(perforated=solid.perforated)
@@ -62,13 +65,13 @@ def outline_difference(solid: CoarseSolid, view: View, evidence: Evidence) -> np
 
 
 def iou(mask: np.ndarray, evidence: Evidence) -> float:
-    """Return intersection over union of a mask and the photo's."""
+    """Return the intersection over union of a mask and the photo's."""
     drawn = mask > 0
     return float((drawn & evidence.mask).sum() / max(1, (drawn | evidence.mask).sum()))
 
 
 def residual(solid: CoarseSolid, view: View, evidence: Evidence) -> Residual:
-    """Compare a solid seen from a view with a photo."""
+    """Return the residual of a solid under a view."""
     evidence = evidence.compared_with(perforated=solid.perforated)
     flat, distance = view.project(solid.vertices)
     pixels = to_pixels(flat, FINE * SIDE_PX, BOX_SHARE)
@@ -94,7 +97,7 @@ def _hidden(solid: CoarseSolid, part: np.ndarray) -> float:
 
 
 def _outline_distance(drawn: np.ndarray, evidence: Evidence) -> float:
-    """Return the mean distance from each outline to the other, cut at the reach, over the object's longer side."""
+    """Return the mean symmetric distance of the contours, truncated at the reach, over the object's longer side."""
     inside = evidence.mask.astype(np.uint8)
     cross = np.ones((3, 3), np.uint8)
     here, there = drawn - cv2.erode(drawn, cross), inside - cv2.erode(inside, cross)
@@ -107,7 +110,7 @@ def _outline_distance(drawn: np.ndarray, evidence: Evidence) -> float:
 
 
 def _edges(normals: np.ndarray, part: np.ndarray, drawn: np.ndarray, evidence: Evidence) -> tuple[float, int]:
-    """Return the share of inner edges without one in the photo, and the number of their pixels."""
+    """Return the share of inner edges without an edge in the photo, and the number of edge pixels."""
     inner = (cv2.erode(drawn, np.ones((5, 5), np.uint8)) > 0) & evidence.inner
     edge = np.zeros(drawn.shape, bool)
     for axis in (0, 1):
@@ -119,12 +122,12 @@ def _edges(normals: np.ndarray, part: np.ndarray, drawn: np.ndarray, evidence: E
     edge &= inner
     count = int(edge.sum())
     missing = float(1 - evidence.edge[edge].mean()) if count else 1.0
-    # few pixels say little: they count with as many that would say nothing either way
+    # Regularize: few pixels are weak evidence and are mixed with neutral ones.
     return (count * missing + _LEAST_EDGE_PX * 0.7) / (count + _LEAST_EDGE_PX), count
 
 
 def _unexplained(normals: np.ndarray, part: np.ndarray, drawn: np.ndarray, evidence: Evidence) -> float:
-    """Return the share of the colours' variance that is left by a linear model of the normals for each part."""
+    """Return the share of the colour variation that remains after a linear model of the normals per part."""
     both = ((drawn > 0) & evidence.inner)[::2, ::2]
     colours = evidence.lab[::2, ::2][both].astype(np.float64) * (_LIGHTNESS_SHARE, 1.0, 1.0)
     if len(colours) < 30:
@@ -139,5 +142,5 @@ def _unexplained(normals: np.ndarray, part: np.ndarray, drawn: np.ndarray, evide
         gram = features.T @ features + _RIDGE * np.diag([0.0, 1, 1, 1, 1, 1]) + 1e-6 * np.eye(6)
         fitted = features @ np.linalg.solve(gram, features.T @ some)
         left += float(np.abs(some - fitted).sum())
-    # differences count, not their squares: a label's print is no reason to turn the object
+    # Absolute rather than squared differences, so that printed labels do not dominate.
     return min(1.0, left / max(float(np.abs(colours).sum()), 2.0 * len(colours)))

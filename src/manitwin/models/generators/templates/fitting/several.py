@@ -1,4 +1,4 @@
-"""Fit one template to several photos of one thing: common measures, a view of each photo, and the turns between them."""
+"""Joint fit of one template to several photos of an object: common measures, and one view per photo."""
 
 from __future__ import annotations
 
@@ -22,24 +22,26 @@ _YAWS = 24
 _TIED_STARTS, _RIVALS = 3, 3
 _SURE = 0.9
 _FAR_DEG, _CLEARLY_WORSE = 40.0, 0.03
-"""Another turn is a rival where it is farther than this and its cost not higher by this much."""
+"""A rotation is a rival if it is farther away than this angle and its cost is not higher by this amount."""
 
 
 @dataclass(frozen=True)
 class SeveralFitted:
-    """A fit of each photo, all with the same ``made``; ``told (N,)``: no far-apart turn explains the photo about as well."""
+    """A fit of each photo, all with the same ``made``. ``told (N,)``: no distant rotation explains the photo about as well."""
 
     fits: tuple[Fitted, ...]
     told: tuple[bool, ...]
 
     @property
     def confidence(self) -> float:
-        """The thing is as sure as the least sure of its photos."""
+        """The minimum confidence of the photos."""
         return min(fit.confidence for fit in self.fits)
 
     @property
     def turns_deg(self) -> tuple[float, ...]:
-        """The camera's turn about the thing's vertical in each photo, counter-clockwise, in 0..360, that of the first 0."""
+        """The camera's rotation about the object's vertical per photo, counter-clockwise, in 0..360, relative to the
+        first photo.
+        """
         first = self.fits[0].view.yaw_rad
         return tuple(round(float(np.degrees(first - fit.view.yaw_rad)) % 360.0, 1) % 360.0 for fit in self.fits)
 
@@ -52,11 +54,11 @@ def fit_several(
     turns_deg: Sequence[float] | None = None,
     focals_mm: Sequence[float | None] | None = None,
 ) -> SeveralFitted | None:
-    """Fit one thing of a category to several photos ``(H, W, 4) uint8`` of it, whose alphas are its masks.
+    """Fit one object of a category to several photos ``(H, W, 4) uint8`` of it with its masks as alpha.
 
-    The measures are common, the views each photo's own; ``turns_deg``, the camera's counter-clockwise turns about the vertical,
-    say where the views' search starts; ``focals_mm`` are the lenses as 35 mm equivalent where they are known. None where no
-    measures give a solid.
+    The measures are common, the views are per photo. ``turns_deg``, the camera's counter-clockwise rotations about the vertical,
+    give the start of the view search. ``focals_mm`` are focal lengths (35 mm equivalent), if known. Returns None if no measures
+    give a solid.
     """
     template = load_templates()[category]
     lenses = [None] * len(photos) if focals_mm is None else focals_mm
@@ -66,12 +68,12 @@ def fit_several(
     alone = [found[0] for number in searched if (found := search([usual], evidences[number]))]
     if len(alone) < len(searched):
         return None
-    # which way round the thing is seen is settled by the photo that is explained best: a box has two widths to swap
+    # The best explained photo resolves the orientation: a box has two widths that can be swapped.
     best = min(alone, key=lambda candidate: candidate.residual.cost)
     family = Family(template, best.family.measures(best.spreads))
     start = np.zeros(len(family.free))
     solid = family.solid(start)
-    assert solid is not None  # the best fit is one
+    assert solid is not None  # the best fit has a solid
     round_about = is_round(solid)
     problem = Problem(family, evidences, round_about)
     if turns_deg is None:
@@ -96,12 +98,12 @@ def fit_several(
 
 
 def _most_crossing(turns_deg: Sequence[float]) -> int:
-    """Return the photo whose direction is nearest to a right angle to that of the first."""
+    """Return the photo whose direction is closest to a right angle with that of the first."""
     return int(np.argmax(np.abs(np.sin(np.radians(np.subtract(turns_deg, turns_deg[0]))))[1:])) + 1
 
 
 def _seen_as(family: Family, solid: CoarseSolid, candidate: Candidate, evidence: Evidence) -> Placed:
-    """Return the view of a photo that a common solid has: that of its own fit, or a new one where it explains less."""
+    """Return the view of a common solid in a photo: that of its own fit, or a new search if that explains less."""
     begin = Placed(_boxed(solid, candidate.view), candidate.upright)
     _, (placed,) = Problem(family, [evidence], False).solve(
         np.zeros(len(family.free)), [begin], measures=False, rounds=3
@@ -121,7 +123,7 @@ def _tied(
     alone: Sequence[Candidate],
     turns_deg: Sequence[float],
 ) -> tuple[np.ndarray, list[Placed]]:
-    """Return measures and views at the stated turns that explain all photos best, from any first turn; cameras stand upright."""
+    """Return measures and views at the stated rotations that explain all photos best; the cameras are upright."""
     elevations = {*np.radians(ELEVATIONS_DEG), *(each.view.elevation_rad for each in alone if each.upright)}
     usual = [np.clip(each.perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE) for each in evidences]
     scored: list[tuple[float, list[View]]] = []
@@ -139,7 +141,7 @@ def _tied(
     scored.sort(key=lambda each: each[0])
     found = []
     for _, views in scored[:_TIED_STARTS]:
-        # one photo says little of the sides that another shows: the measures follow, or a right turn would look wrong
+        # A photo says little about sides that another shows: the measures must follow, or a correct rotation would look wrong.
         begin = [Placed(view, True) for view in views]
         spreads, placed = problem.solve(np.zeros(len(family.free)), begin, measures=True, rounds=4)
         other = family.solid(spreads) or solid
@@ -162,7 +164,7 @@ def _iou(solid: CoarseSolid, view: View, evidence: Evidence) -> float:
 
 
 def _is_told(family: Family, fit: Fitted, evidence: Evidence) -> bool:
-    """Tell whether every far-apart turn explains a photo clearly worse than the one that was found."""
+    """Return whether every distant rotation explains a photo clearly worse than the fitted one."""
     at = np.zeros(len(family.free))
     solid = family.solid(at)
     if solid is None:

@@ -1,4 +1,4 @@
-"""A template as a family of shapes: its measures as unknowns in units of their spread, and coarse solids of them."""
+"""A template as a family of shapes with its measures as normalized unknowns, and coarse solids of it."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from manitwin.models.generators.templates.fitting.drawing import edges_between
 from manitwin.models.generators.templates.fitting.view import normalised
 from manitwin.models.generators.templates.template import Template
 
-_COARSE = 0.6  # of the chords of a full circle: the outline is off by 0.4 % of a radius
-_SPREADS_IN_INTERVAL = 1.5  # the interval that nearly all things are in reaches so many standard deviations either way
+_COARSE = 0.6  # of the chords of a full circle: the contour is off by 0.4 % of a radius
+_SPREADS_IN_INTERVAL = 1.5  # standard deviations from the middle to either end of the usual interval
 MOST_SPREADS = 4.0
-_LEAST_SPREAD = 0.04  # of the usual value
+_LEAST_SPREAD = 0.04  # of the typical value
 
 
 @dataclass(frozen=True)
 class CoarseSolid:
-    """A solid with normalised ``vertices (V, 3)``, ``faces (F, 3)``, ``part (F,)`` and its ``names``.
+    """A solid with normalized ``vertices (V, 3)``, ``faces (F, 3)``, ``part (F,)`` and part ``names``.
 
-    ``edges`` are those of ``edges_between``. What is ``perforated`` is without its small holes."""
+    ``edges`` is the result of ``edges_between``. A ``perforated`` solid lacks its small holes.
+    """
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -35,19 +36,19 @@ class CoarseSolid:
 
     @classmethod
     def of(cls, mesh: PartedMesh, *, perforated: bool = False) -> CoarseSolid:
-        """Normalise a closed mesh and find its edges."""
+        """Normalize a closed mesh and find its edges."""
         unit, _, _ = normalised(mesh.vertices)
         return cls(unit, mesh.faces, mesh.part, mesh.names, edges_between(mesh.faces), perforated)
 
     @property
     def normals(self) -> np.ndarray:
-        """The faces' outward unit normals ``(F, 3)``."""
+        """Outward unit normals ``(F, 3)`` of the faces."""
         cross = self._cross
         return np.asarray(cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-15))
 
     @property
     def areas(self) -> np.ndarray:
-        """The faces' areas ``(F,)``, in squares of the half diagonal."""
+        """Areas ``(F,)`` of the faces, in squares of the half diagonal."""
         return np.asarray(np.linalg.norm(self._cross, axis=1) / 2)
 
     @property
@@ -56,15 +57,17 @@ class CoarseSolid:
         return np.cross(b - a, c - a)
 
     def reshaped(self, vertices: np.ndarray) -> CoarseSolid:
-        """Return the same faces with other normalised vertices."""
+        """Return the same faces with other normalized vertices."""
         return replace(self, vertices=vertices)
 
 
 class Family:
-    """The shapes of a template. A photo tells no size, so its first length keeps its usual value and only the others vary."""
+    """The shapes of a template. A photo does not determine the size: the first length keeps its expected value, the
+    others vary.
+    """
 
     def __init__(self, template: Template, initial: Mapping[str, float] | None = None):
-        """Take the template, and measures that are expected in place of the usual ones."""
+        """Take the template, and expected measures that replace the typical ones."""
         self.template = template
         prior = lookup(template.category)
         self.stands = prior is not None and prior.stands is True
@@ -85,21 +88,21 @@ class Family:
         self._made: dict[tuple[float, ...], CoarseSolid | None] = {}
 
     def measures(self, spreads: np.ndarray) -> dict[str, float]:
-        """Return the measures that lie ``spreads (K,)`` from the expected ones."""
+        """Return the measures at ``spreads (K,)`` standard deviations from the expected ones."""
         values = self._middle + spreads * np.where(spreads < 0, self._below, self._above)
         return self._fixed | {name: float(value) for name, value in zip(self.free, values, strict=True)}
 
     def solid(self, spreads: np.ndarray) -> CoarseSolid | None:
-        """Return the coarse solid there; None where the measures give none."""
+        """Return the coarse solid at ``spreads``, cached; None if the measures give none."""
         key = tuple(np.round(spreads, 3).tolist())
         if key not in self._made:
             self._made[key] = self._build(np.array(key))
         return self._made[key]
 
     def changes(self, spreads: np.ndarray, step: float) -> list[tuple[np.ndarray, np.ndarray] | None]:
-        """Return for each measure how the vertices move when it grows and when it shrinks by ``step`` spreads.
+        """Return the vertex displacements when each measure grows and shrinks by ``step`` spreads.
 
-        None where the solid there has other faces, as where a chord more fits in: then it has to be built.
+        None for a measure whose change alters the faces, such as the number of chords; the solid must then be rebuilt.
         """
         here = self.solid(spreads)
         moves: list[tuple[np.ndarray, np.ndarray] | None] = []

@@ -1,7 +1,7 @@
-"""The texture of a fitted template: the photos where they show the surface, and quiet colours where none does.
+"""Texture of a fitted template: photos where they show the surface, smooth colours elsewhere.
 
-Unseen places take what the photo shows of their own part: the ring of the same height where the part is turned about Z, else
-the nearest places that are seen. A median over many of them keeps the ground and drops letters, which a copy would mirror.
+Unseen faces take colours of the same part: from the ring of equal height for parts of revolution about Z, else from the nearest
+seen faces. A median over many faces keeps the base colour and removes print, which copying would mirror.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from manitwin.models.generators.templates.fitting.view import View, normalised
 
 TEXTURE_PX, MOST_WIDTH_PX = 1024, 4096
 _CELL_PX = 48
-_LONGEST_EDGE = 0.05  # of the half diagonal: no face is larger than what one decides about
-_GRAZING_COSINE = 0.17  # beyond 80 degrees the photo shows streaks
-_NEARBY = 0.022  # of the half diagonal: what has something else before it as near as this may show that instead
+_LONGEST_EDGE = 0.05  # of the half diagonal: size of the faces for which visibility is decided
+_GRAZING_COSINE = 0.17  # 80 degrees: beyond, the photo gives streaks
+_NEARBY = 0.022  # of the half diagonal: faces this close to an occluder may show it instead
 _BEFORE = 0.05
 _NEAREST = 48
-_NEAR_AT_ONCE = 1 << 19  # neighbours: all unseen faces of a thing have ten times as many, 200 MB
+_NEAR_AT_ONCE = 1 << 19  # neighbours per query: all unseen faces at once have ten times as many, 200 MB
 _LEAST_SEEN = 6
 _BORDER = 0.1
 _ROUND_SPREAD = 0.03
@@ -36,7 +36,7 @@ _MARGIN = 0.05
 
 @dataclass(frozen=True)
 class Shot:
-    """A photo ``rgba (H, W, 4) uint8`` and the view that it shows; ``center_px`` and ``box_px`` place the photo frame in it."""
+    """A photo ``rgba (H, W, 4) uint8`` and its view; ``center_px`` and ``box_px`` place the photo frame in it."""
 
     view: View
     rgba: np.ndarray
@@ -46,9 +46,10 @@ class Shot:
 
 @dataclass(frozen=True)
 class Textured:
-    """A refined solid ``vertices (V, 3)`` m, ``faces (F, 3)``, ``uv (F, 3, 2)`` (v upward) into ``texture (H, W, 3) uint8``.
+    """A refined solid: ``vertices (V, 3)`` m, ``faces (F, 3)``, ``uv (F, 3, 2)`` (v upward), ``texture (H, W, 3) uint8``.
 
-    ``seen (F,)`` is where a photo shows it, ``part (F,)`` which part each face is of."""
+    ``seen (F,)`` says whether a photo shows a face, ``part (F,)`` which part it belongs to.
+    """
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -58,23 +59,23 @@ class Textured:
     part: np.ndarray
 
     def mesh(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return vertices ``(N, 3)``, faces ``(F, 3)`` and uv ``(N, 2)`` with a vertex for each place in the texture."""
+        """Return vertices ``(N, 3)``, faces ``(F, 3)`` and uv ``(N, 2)`` with vertices split at texture seams."""
         corners = np.column_stack([self.faces.reshape(-1, 1), np.round(self.uv.reshape(-1, 2) * 65536)])
         _, first, index = np.unique(corners, axis=0, return_index=True, return_inverse=True)
         return self.vertices[self.faces.ravel()[first]], index.reshape(-1, 3), self.uv.reshape(-1, 2)[first]
 
     @property
     def unseen_share(self) -> float:
-        """How much of the area no photo shows."""
+        """Share of the area that no photo shows."""
         a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
         areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         return float(areas[~self.seen].sum() / areas.sum())
 
 
 def textured(mesh: PartedMesh, shots: Sequence[Shot], colours: Mapping[str, tuple[float, float, float]]) -> Textured:
-    """Texture a solid with what photos show of it, each face from the one that looks at it most directly.
+    """Texture a solid from photos, each face from the photo that faces it most directly.
 
-    ``colours`` (sRGB, 0..1) are those of parts that the photos show nothing of.
+    ``colours`` (sRGB, 0..1) are used for parts that no photo shows.
     """
     fine = refined(mesh)
     points, center, half = normalised(fine.vertices)
@@ -105,7 +106,7 @@ def _side_by_side(pictures: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def refined(mesh: PartedMesh) -> PartedMesh:
-    """Return the same solid with no long edges."""
+    """Return the same solid without long edges."""
     half = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0))) / 2
     solid = Manifold(
         Mesh(
@@ -124,7 +125,7 @@ def refined(mesh: PartedMesh) -> PartedMesh:
 
 
 def _seen(points: np.ndarray, mesh: PartedMesh, view: View) -> np.ndarray:
-    """Return the cosine ``(F,)`` at which the camera sees each face, 0 where not well and whole."""
+    """Return the cosine ``(F,)`` of the viewing angle of each face, 0 if it is not completely visible."""
     solid = trimesh.Trimesh(points, mesh.faces, process=False)
     caster, eye = RayCaster(solid), view.camera_position
     corners = points[mesh.faces]
@@ -146,7 +147,7 @@ def _seen(points: np.ndarray, mesh: PartedMesh, view: View) -> np.ndarray:
 
 
 def _crop(rgba: np.ndarray, side_px: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return the object's colours without those of the background, the crop's corner in the photo (x, y), and its scale."""
+    """Return the object's colours without background colours, the crop's corner in the photo (x, y), and its scale."""
     solid = rgba[..., 3] > 127
     rows, columns = np.nonzero(solid.any(axis=1))[0], np.nonzero(solid.any(axis=0))[0]
     margin = int(np.ceil(_MARGIN * max(np.ptp(rows), np.ptp(columns)))) + 2
@@ -160,7 +161,7 @@ def _crop(rgba: np.ndarray, side_px: int) -> tuple[np.ndarray, np.ndarray, float
 
 
 def _sampled(photo: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Return the photo's smoothed colours ``(V, 3)`` at places ``(V, 2)``."""
+    """Return the photo's smoothed colours ``(V, 3)`` at positions ``(V, 2)``."""
     soft = cv2.GaussianBlur(photo, (0, 0), max(1.0, 0.006 * max(photo.shape)))
     at = pixels.astype(np.float32)
     channels = [
@@ -179,11 +180,11 @@ def _unseen_colours(
 ) -> np.ndarray:
     """Return a colour ``(F, 3)`` for each face that is not ``seen``, 0 for the others.
 
-    It comes from those, ``of_face (F, 3)``, that the photos show of its part.
+    It is derived from the photo colours ``of_face (F, 3)`` of seen faces of its part.
     """
     centers = points[mesh.faces].mean(axis=1)
     tones = np.zeros((len(centers), 3))
-    shown_as: dict[tuple[float, float, float], np.ndarray] = {}  # what is seen of a part speaks for others of its look
+    shown_as: dict[tuple[float, float, float], np.ndarray] = {}  # a seen part gives the colour of others with its look
     for name in mesh.names:
         known = (mesh.part == mesh.names.index(name)) & seen
         if known.sum() >= _LEAST_SEEN and colours[name] not in shown_as:
@@ -200,7 +201,7 @@ def _unseen_colours(
         places = _across(centers) if _is_turned(centers[own]) else centers
         count = min(len(some), max(_NEAREST, len(some) // 8))
         quiet = _nearest_medians(some, cKDTree(places[known]), places[wanted], count)
-        # at the border of what is seen the colours go over into each other
+        # Blend the colours at the border of the seen region.
         distance, close = cKDTree(there).query(centers[wanted], k=6)
         share = np.exp(-((distance[:, 0] / _BORDER) ** 2))[:, None]
         tones[wanted] = share * some[close].mean(axis=1) + (1 - share) * quiet
@@ -208,7 +209,7 @@ def _unseen_colours(
 
 
 def _nearest_medians(colours: np.ndarray, tree: cKDTree, places: np.ndarray, count: int) -> np.ndarray:
-    """Return the median (M, 3) of the ``count`` of the ``colours (N, 3)`` whose points in the tree are nearest to ``places``."""
+    """Return the median ``(M, 3)`` of the ``count`` nearest ``colours (N, 3)`` for each position, by the tree of their points."""
     at_once = max(1, _NEAR_AT_ONCE // count)
     channels = np.ascontiguousarray(colours.T)
     medians = np.empty((len(places), 3))
@@ -221,7 +222,7 @@ def _nearest_medians(colours: np.ndarray, tree: cKDTree, places: np.ndarray, cou
 
 
 def _is_turned(centers: np.ndarray) -> bool:
-    """Tell whether the faces' centres of a part lie on rings about Z: hardly any radius differs at its height."""
+    """Return whether the face centres of a part lie on rings about Z, so that the radius is nearly constant at each height."""
     radius, height = np.hypot(centers[:, 0], centers[:, 1]), centers[:, 2]
     if radius.max() < 1e-6 or len(centers) < 24:
         return False
@@ -234,17 +235,17 @@ def _is_turned(centers: np.ndarray) -> bool:
 
 
 def _across(centers: np.ndarray) -> np.ndarray:
-    """Return radius and height ``(N, 2)``: what is on one ring is one place."""
+    """Return radius and height ``(N, 2)``, which identify points of one ring."""
     return np.column_stack([np.hypot(centers[:, 0], centers[:, 1]), centers[:, 2]])
 
 
 def _charts(
     points: np.ndarray, mesh: PartedMesh, wanted: np.ndarray, tones: np.ndarray
 ) -> tuple[list[np.ndarray], dict[int, tuple[int, np.ndarray]]]:
-    """Return small pictures of the colours of the wanted faces, and for each face its picture and corners ``(3, 2)`` in it.
+    """Return small images with the colours of the wanted faces, and for each face its image and corners ``(3, 2)`` in it.
 
-    A chart holds the faces of a part that look along one axis, projected along it: their colours are quiet, so that faces
-    behind each other may share a place.
+    A chart holds the faces of a part with one dominant normal direction, projected along it. Faces behind each other may overlap,
+    since their colours are smooth.
     """
     normals = np.cross(
         points[mesh.faces[:, 1]] - points[mesh.faces[:, 0]], points[mesh.faces[:, 2]] - points[mesh.faces[:, 0]]
@@ -274,7 +275,7 @@ def _charts(
 def _laid_out(
     photo: np.ndarray, at: np.ndarray, cells: list[np.ndarray], places: dict[int, tuple[int, np.ndarray]]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Put the cells beside the photo, where the corners are ``at (F, 3, 2)``; return the picture and the coordinates in it."""
+    """Place the charts beside the photo, whose face corners are ``at (F, 3, 2)``; return the image and the uv coordinates."""
     rows = max(1, photo.shape[0] // _CELL_PX)
     columns = -(-len(cells) // rows)
     height, width = max(photo.shape[0], _CELL_PX), photo.shape[1] + columns * _CELL_PX

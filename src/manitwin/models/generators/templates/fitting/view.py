@@ -1,7 +1,7 @@
-"""How a camera sees a thing that rests on its base: turn, elevation, roll, perspective, and place in the photo.
+"""Camera model of an object resting on its base: yaw, elevation, roll, perspective, and placement in the photo.
 
-Photo frame: x right, y down, the object's box in the photo centred at the origin, its longer side 1. Object frame: Z up,
-front towards -Y; for projection the object's box is centred and its half diagonal is 1.
+Photo frame: x right, y down, origin at the centre of the object's box, whose longer side is 1. Object frame: Z up, front towards
+-Y; for projection the object's box is centred and its half diagonal is 1.
 """
 
 from __future__ import annotations
@@ -15,9 +15,11 @@ LEAST_PERSPECTIVE, MOST_PERSPECTIVE = 0.02, 0.55
 
 @dataclass(frozen=True)
 class View:
-    """A camera: ``yaw_rad`` turns the object about Z, ``elevation_rad`` is the camera's above the ground, ``roll_rad`` turns
-    the picture clockwise, ``perspective`` is the object's half diagonal over the camera's distance, ``scale`` and ``x``, ``y``
-    place the object in the photo frame.
+    """A camera: ``yaw_rad`` rotates the object about Z, ``elevation_rad`` is the camera's elevation, ``roll_rad`` rotates the
+    image clockwise.
+
+    ``perspective`` is the object's half diagonal over the camera distance; ``scale``, ``x`` and ``y`` place the object in the
+    photo frame.
     """
 
     yaw_rad: float
@@ -30,7 +32,7 @@ class View:
 
     @property
     def object_to_camera(self) -> np.ndarray:
-        """The rotation ``(3, 3)`` to camera axes: x right, y up, z towards the camera."""
+        """Rotation ``(3, 3)`` to camera axes: x right, y up, z towards the camera."""
         cos_y, sin_y = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
         cos_e, sin_e = np.cos(self.elevation_rad), np.sin(self.elevation_rad)
         cos_r, sin_r = np.cos(self.roll_rad), np.sin(self.roll_rad)
@@ -40,11 +42,11 @@ class View:
         return roll @ tilt @ turn
 
     def in_camera(self, points: np.ndarray) -> np.ndarray:
-        """Return normalised object points ``(N, 3)`` in camera axes about the object's centre."""
+        """Return normalized object points ``(N, 3)`` in camera axes about the object's centre."""
         return np.asarray(points @ self.object_to_camera.T)
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return places ``(N, 2)`` in the photo frame of normalised object points ``(N, 3)``, and their distance ``(N,)``."""
+        """Return photo-frame positions ``(N, 2)`` of normalized object points ``(N, 3)``, and their distances ``(N,)``."""
         seen = self.in_camera(points)
         nearness = 1.0 / (1.0 - self.perspective * seen[:, 2])
         flat = seen[:, :2] * np.array([1.0, -1.0]) * nearness[:, None]
@@ -52,19 +54,19 @@ class View:
 
     @property
     def camera_position(self) -> np.ndarray:
-        """The projection centre ``(3,)`` in normalised object coordinates."""
+        """Projection centre ``(3,)`` in normalized object coordinates."""
         return np.asarray(self.object_to_camera[2] / self.perspective)
 
 
 def normalised(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return vertices ``(V, 3)`` about their box's centre in half diagonals, that centre ``(3,)`` and that half diagonal."""
+    """Return vertices ``(V, 3)`` relative to their box's centre in half diagonals, that centre ``(3,)`` and the half diagonal."""
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     center, half = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     return (vertices - center) / half, center, half
 
 
 def boxed(flat: np.ndarray) -> tuple[float, float, float]:
-    """Return scale and shift that bring points ``(N, 2)`` into the photo frame's box: longer side 1, centred."""
+    """Return scale and shift that bring points ``(N, 2)`` into the photo frame: longer side 1, centred."""
     low, high = flat.min(axis=0), flat.max(axis=0)
     scale = 1.0 / float((high - low).max())
     x, y = -scale * (low + high) / 2
@@ -72,9 +74,9 @@ def boxed(flat: np.ndarray) -> tuple[float, float, float]:
 
 
 def of_turned(view: View, vertices: np.ndarray) -> tuple[View, np.ndarray]:
-    """Return vertices ``(V, 3)`` turned about Z by a view's yaw, and the view without it that sees them where they were.
+    """Return vertices ``(V, 3)`` rotated about Z by a view's yaw, and the equivalent view without yaw.
 
-    Their box is another one, by whose centre and half diagonal a view is told: what this moves along the line of sight is left.
+    The rotated vertices have another box, to which a view is relative; the resulting shift along the line of sight is neglected.
     """
     cos, sin = np.cos(view.yaw_rad), np.sin(view.yaw_rad)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
