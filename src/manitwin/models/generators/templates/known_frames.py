@@ -1,4 +1,4 @@
-"""The frames of a template's known points: place and direction by construction, extent and second direction by its parts."""
+"""Frames of a template's known points: position and Z by construction, size and X from the geometry of its parts."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from manitwin.models.generators.templates.template import KnownPoint
 from manitwin.twin.point_records import FunctionalFrame
 
 _TURNS = 48
-_BELOW_RIM_SHARE = 0.1  # of the nearest wall's distance: rays that look for the rim go so far below its plane
+_BELOW_RIM_SHARE = 0.1  # of the distance to the nearest wall: depth of rays below the rim plane
 _FACING = np.cos(np.radians(25))
 _END_SHARE = 0.012  # of the longest side
-_ROUND = 1.15  # farthest by nearest wall of a rim that is round
+_ROUND = 1.15  # maximum ratio of farthest to nearest wall of a round rim
 _HANDLES, _SPOUTS = ("handle", "grips"), ("spout",)
 
 
 def known_frame(made: Made, point: KnownPoint, center_of_mass_m: np.ndarray) -> FunctionalFrame:
-    """Return the frame of a known point in the thing's object frame.
+    """Return the frame of a known point in the object frame.
 
-    Position and Z are those that the template states, of a face the middle of it. X and the size follow from the faces of
-    its parts: of an opening away from the handle or towards the spout, of an edge along it, of a hole towards the centre of
-    mass ``(3,)``.
+    Position and Z are those of the template; for a face, the position is its centre. X and the size follow from the faces of the
+    part. X points away from the handle or towards the spout for an opening, along an edge, and towards the centre of mass
+    ``(3,)`` for a hole.
     """
     position, z = np.array(point.position_m), np.array(point.direction) / np.linalg.norm(point.direction)
     x, size, free = _extent(made, point, position, z, center_of_mass_m)
@@ -44,7 +44,7 @@ def known_frame(made: Made, point: KnownPoint, center_of_mass_m: np.ndarray) -> 
 def _extent(
     made: Made, point: KnownPoint, position: np.ndarray, z: np.ndarray, center_of_mass_m: np.ndarray
 ) -> tuple[np.ndarray, float, bool]:
-    """Return X, the size and whether the roll is free."""
+    """Return the X direction, the size, and whether the roll about Z is free."""
     longest = float(np.ptp(made.mesh.vertices, axis=0).max())
     if point.kind in ("opening", "hole"):
         walls = _walls_m(made, position, z)
@@ -72,7 +72,7 @@ def _extent(
 
 
 def _face_center(made: Made, point: KnownPoint, position: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the middle of the part's faces that lie in the plane of a stated place and look along ``z``."""
+    """Return the centre of the part's faces that lie in the plane of ``position`` and face along ``z``."""
     corners = made.mesh.vertices[made.mesh.faces[made.mesh.faces_of(point.part)]]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     areas, centers = np.linalg.norm(cross, axis=1), corners.mean(1)
@@ -82,7 +82,7 @@ def _face_center(made: Made, point: KnownPoint, position: np.ndarray, z: np.ndar
 
 
 def _walls_m(made: Made, position: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return how far the walls are around an opening or hole, just within it ``(48,)`` m."""
+    """Return the distances ``(48,)`` in metres to the walls around an opening or hole, just below its rim."""
     caster = RayCaster(trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False))
     basis = rotation_of(z)
     angle = np.arange(_TURNS) * 2 * np.pi / _TURNS
@@ -112,6 +112,6 @@ def _pour_direction(made: Made, position: np.ndarray, z: np.ndarray) -> np.ndarr
                 mean = (across.min(0) + across.max(0)) / 2
                 if np.linalg.norm(mean) > 0.25 * float(np.linalg.norm(across, axis=1).max()):
                     return np.asarray(sign * mean)
-                spread = np.linalg.eigh(across.T @ across)[1][:, 2]  # two handles opposite each other: between them
+                spread = np.linalg.eigh(across.T @ across)[1][:, 2]  # two opposite handles: X is between them
                 return np.asarray(np.cross(z, spread))
     return None

@@ -50,14 +50,13 @@ SHADES = {
     "matt": 0.0,
 }
 SHADES |= {"glossy": 0.0, "shiny": 0.0}
-"""How far towards white (positive) or black (negative) a word before a colour moves it."""
+"""Shift of a colour towards white (positive) or black (negative) by a preceding word."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """Appearance and material of a part: ``rgb`` sRGB in 0..1, PBR factors, a surface of the priors' materials, density.
-
-    ``wall`` is the usual wall thickness relative to ceramic: sheet metal is thin.
+    """Appearance and material of a part: ``rgb`` sRGB in 0..1, PBR factors, a surface of the priors' materials, density, and
+    ``wall``, the usual wall thickness relative to ceramic (sheet metal is thin).
     """
 
     material: str
@@ -198,9 +197,8 @@ FOODS: dict[str, Look] = {
         _look("raw fish", "food skin", "ee8a5e", 0.35, 1060),
     )
 }
-"""Looks of food, used by template tables but not in texts: a "chocolate mug" is not made of chocolate.
-
-Each is a whole piece with its air and skin; densities are the usual ones of ``prior_tables/food.toml`` or within its intervals.
+"""Looks of food, used by template tables but not in texts: a "chocolate mug" is not made of chocolate. Each is a whole piece with
+its air and skin; densities are the usual ones of ``prior_tables/food.toml`` or within its intervals.
 """
 SAME_MATERIAL = {
     "wooden": "wood", "metal": "stainless steel", "metallic": "stainless steel", "stainless": "stainless steel",

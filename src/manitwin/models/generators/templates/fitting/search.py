@@ -1,6 +1,6 @@
-"""The search for measures and view: a grid of views with the usual measures, then least squares from the best of them.
+"""Global search for measures and view: a grid of views with the typical measures, then least squares from the best ones.
 
-Outlines alone lead the least squares (``least_squares``); inner edges, shading and what is hidden then choose.
+Silhouettes alone drive the least squares (``least_squares``); inner edges, shading and hidden parts then select the result.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE,
 ELEVATIONS_DEG = (4.0, 20.0, 36.0, 54.0, 78.0)
 YAWS = 12
 _ROUND_IOU = 0.985
-_TILTED_COST = 0.04  # of IoU: most things are photographed as they rest
+_TILTED_COST = 0.04  # in IoU: most objects are photographed at rest
 _STARTS, _STARTS_OF_OTHERS = 7, 3
 _REFINED, _RIVALS = 2, 2
 _ROUNDS = 6
 _SETTLED_ROUNDS, _SETTLED_ENOUGH = 12, 0.9995
-"""Ended sooner, two sizes of one photo have measures that differ by 3 %."""
+"""With an earlier stop, the measures from two image sizes of one photo differ by 3 %."""
 _OTHER_KIND_COST = 0.02
-_OTHER_MEASURES_COST = 0.005  # the same kind from other measures: enough to settle what an outline leaves open
-_USUAL_ELEVATION_DEG, _STEEP_COST = 30.0, 0.0005  # a degree more: what stands is seldom seen from above
+_OTHER_MEASURES_COST = 0.005  # same category, other measures: resolves silhouette ambiguities
+_USUAL_ELEVATION_DEG, _STEEP_COST = 30.0, 0.0005  # per degree: standing objects are seldom seen from above
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """Measures of a family by their spreads, a view, and what they leave unexplained; ``upright``: the camera was not rolled."""
+    """A fit: measures of a family (in spreads), view, and residual; ``upright`` means that the camera was not rolled."""
 
     family: Family
     spreads: np.ndarray
@@ -44,11 +44,11 @@ class Candidate:
 
 
 def search(families: Sequence[Family], evidence: Evidence, *, settled: bool = False) -> list[Candidate]:
-    """Return fits to a photo, the best first; empty where no usual measures give a solid.
+    """Return fits to a photo, best first; empty if no usual measures give a solid.
 
-    The first family is what the photo is said to show, the others what may be meant: they have to explain it better; less so
-    where only the expected measures are others. ``settled``: measures are followed until they hardly change, which what is
-    fitted together with other photos need not be.
+    The first family is the named one. Other families must explain the photo better by a margin, which is smaller if only the
+    expected measures differ. ``settled`` iterates until the measures hardly change, which is unnecessary before a joint fit with
+    other photos.
     """
     found: list[_Start] = []
     usual: dict[int, _Start] = {}
@@ -89,7 +89,7 @@ def search(families: Sequence[Family], evidence: Evidence, *, settled: bool = Fa
 
 @dataclass(frozen=True)
 class _Start:
-    """A view from which a family, by its number, is fitted with its measures."""
+    """A starting view of a family, identified by its number."""
 
     cost: float
     number: int
@@ -99,13 +99,13 @@ class _Start:
 
 
 def _refined(found: list[_Start], usual: dict[int, _Start]) -> list[_Start]:
-    """Return the starts that get their measures: the best of what is said, the best of each near rival, and the usual view.
+    """Return the starts to refine with measures: the best of the named family, the best of each close rival, and the usual view.
 
-    A thing of unusual proportions looks like a usual one from higher up, so the best view is not enough.
+    An object of unusual proportions looks like a usual one seen from higher up, so the best view alone does not suffice.
     """
     of_said = [start for start in found if start.number == 0]
     said = of_said[:_REFINED]
-    if not any(start.upright for start in said):  # a box on its edge is a box of other proportions that stands
+    if not any(start.upright for start in said):  # a box on its edge may be an upright box of other proportions
         said += [start for start in of_said if start.upright][:1]
     best = {start.number: start for start in reversed(found) if start.number}
     rivals = sorted(best.values(), key=lambda start: (start.cost, start.number))[:_RIVALS]
@@ -113,12 +113,12 @@ def _refined(found: list[_Start], usual: dict[int, _Start]) -> list[_Start]:
 
 
 def steep_cost(view: View) -> float:
-    """Return what a fit of something that stands has to explain better for being seen from higher up than most things are."""
+    """Return the penalty of a standing object seen from higher up than usual."""
     return _STEEP_COST * max(0.0, float(np.degrees(view.elevation_rad)) - _USUAL_ELEVATION_DEG)
 
 
 def _prejudice(family: Family, said: Family, view: View, upright: bool) -> float:
-    """Return what a fit has to explain better for being a rarer view, or another kind or other measures than are said."""
+    """Return the penalty for an unusual view, another category, or other expected measures."""
     rare = steep_cost(view) if family.stands and upright else 0.0
     other = 0.0 if family is said else _OTHER_KIND_COST
     if family is not said and family.template is said.template:
@@ -127,7 +127,7 @@ def _prejudice(family: Family, said: Family, view: View, upright: bool) -> float
 
 
 def is_round(solid: CoarseSolid) -> bool:
-    """Tell whether a turn about the upright axis changes nothing that an outline shows."""
+    """Return whether a rotation about the vertical changes no silhouette."""
     views = [View(yaw, 0.5, 0.0, 0.1) for yaw in np.radians((0.0, 37.0, 90.0))]
     masks = []
     for view in views:
@@ -138,7 +138,7 @@ def is_round(solid: CoarseSolid) -> bool:
 
 
 def grid(solid: CoarseSolid, evidence: Evidence, turns: bool) -> list[tuple[View, bool]]:
-    """Return views of a solid by how well its outline agrees with the photo's, the best first, whether upright beside each."""
+    """Return views ranked by silhouette overlap with the photo, best first, each with whether the camera is upright."""
     evidence = evidence.compared_with(perforated=solid.perforated)
     lean = principal_angle(evidence.mask)
     scored: list[tuple[float, View, bool]] = []
@@ -168,13 +168,13 @@ def grid(solid: CoarseSolid, evidence: Evidence, turns: bool) -> list[tuple[View
 
 
 def principal_angle(mask: np.ndarray) -> float:
-    """Return the angle of a mask's longer axis, clockwise from x on the screen, in radians."""
+    """Return the angle of a mask's major axis, clockwise from x on the screen, in radians."""
     moments = cv2.moments(mask.astype(np.uint8), binaryImage=True)
     return 0.5 * float(np.arctan2(2 * moments["mu11"], moments["mu20"] - moments["mu02"]))
 
 
 def _turned(mask: np.ndarray, before: View, after: View) -> np.ndarray:
-    """Return the picture of one view rolled, scaled and moved to another that differs in nothing else."""
+    """Return the mask of one view warped to another that differs only in roll, scale and position."""
     turn = after.roll_rad - before.roll_rad
     ratio = after.scale / before.scale
     matrix = ratio * np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
