@@ -1,4 +1,4 @@
-"""The site of these pages: `make docs`. Strict: every warning and every reference that leads nowhere fails it."""
+"""Sphinx configuration of the documentation site (`make docs`). Every warning and every broken reference is an error."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from manitwin.formats.installation import installed_version
 
-sys.path.insert(0, str(Path(__file__).parent))  # the extension reference_directives
+sys.path.insert(0, str(Path(__file__).parent))  # for the extension reference_directives
 
 project = "ManiTwin"
 author = "The ManiTwin authors"
@@ -18,7 +18,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "reference_directives"]
 exclude_patterns = ["examples/**"]
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence"]
-smartquotes = False  # --vlm stays an option
+smartquotes = False  # keeps --vlm as written
 
 html_theme = "furo"
 html_title = "ManiTwin"
@@ -28,7 +28,7 @@ html_theme_options = {"navigation_with_keys": True}
 
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
-autodoc_class_signature = "separated"  # fields follow below a class: once is enough
+autodoc_class_signature = "separated"  # fields are documented below the class, not in its signature
 autodoc_preserve_defaults = True
 add_module_names = False
 maximum_signature_line_length = 100
@@ -36,7 +36,7 @@ toc_object_entries_show_parents = "hide"
 python_use_unqualified_type_names = True
 
 nitpicky = True
-# types of other packages: their manuals are elsewhere, and nothing here loads or links what is elsewhere
+# Types of other packages are not linked, since the build loads nothing external.
 nitpick_ignore_regex = [
     (r"py:class", r"manitwin\.config\.load\.Kind"),  # a type variable
     (r"py:.*", r"(np|numpy|trimesh|pathlib|Path|pa|pyarrow|mujoco|sapien|collections|typing|duckdb|_duckdb)(\..*)?"),

@@ -1,7 +1,7 @@
-"""Write docs/audit.md from the rules themselves, so that the page cannot be out of date.
+"""Generate docs/audit.md from the audit rules.
 
 python docs/make_audit_page.py            writes the page
-python docs/make_audit_page.py --check    exits 1 where the page differs
+python docs/make_audit_page.py --check    exits with status 1 if the page is out of date
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ This page is written by `python docs/make_audit_page.py`.
 
 
 def section(rule: Rule) -> str:
-    """Return the section of one rule, under an anchor that is its code."""
+    """Return the section of one rule, with an anchor named by its code."""
     fix = " `--fix` can mend it." if rule.fix is not None and "--fix" not in rule.remedy else ""
     head = f'<a id="{rule.code.lower()}"></a>\n### {rule.code} {rule.name}\n\n'
     return f"{head}*{rule.severity}.* {rule.why}\n\n{rule.remedy}{fix}\n"

@@ -1,4 +1,4 @@
-"""Make catalog.png beside this file: twins of a data set, each from three of the sides that a catalogue shows.
+"""Make catalog.png beside this file: twins of a data set, each in three of a catalogue's views.
 
 manitwin build samples/samples.csv -o demo
 python docs/make_catalog_picture.py demo
@@ -22,7 +22,7 @@ SIZE_PX, SIDES, ACROSS = 180, (1, 11, 20), 2
 
 
 def main() -> None:
-    """Draw the twins of the data set that is named."""
+    """Draw the twins of the given data set."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("dataset", type=Path)
     root = DatasetRoot(parser.parse_args().dataset)

@@ -1,7 +1,7 @@
-"""Write docs/configuration.md from the settings themselves, so that the page cannot be out of date.
+"""Generate docs/configuration.md from the settings models.
 
 python docs/make_configuration.py            writes the page
-python docs/make_configuration.py --check    exits 1 where the page differs
+python docs/make_configuration.py --check    exits with status 1 if the page is out of date
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ This page is written by `python docs/make_configuration.py`.
 
 
 def rows(model: type[BaseModel], prefix: str = "") -> list[str]:
-    """Return a table row for every plain setting of a section, nested ones with their path."""
+    """Return a table row for every plain setting of a section; nested settings are shown with their path."""
     found = []
     for name, field in model.model_fields.items():
         annotation = field.annotation
@@ -51,7 +51,7 @@ def rows(model: type[BaseModel], prefix: str = "") -> list[str]:
 
 
 def _default(field: FieldInfo) -> str:
-    """Return the default as TOML writes it; ``not set`` where there is none, as TOML has no word for it."""
+    """Return the default in TOML notation; ``not set`` for None, which TOML cannot express."""
     value = field.get_default(call_default_factory=True)
     if value is None:
         return "not set"
@@ -83,7 +83,7 @@ def page() -> str:
 
 
 def _settings(kind: type[BaseModel], title: str, told: dict[object, str]) -> list[str]:
-    """Return the sections of a configuration; one that another command's has too is ``told`` there, by its name."""
+    """Return the sections of a configuration; a section documented for another command refers to that command (``told``)."""
     sections = {
         n: f.annotation
         for n, f in kind.model_fields.items()

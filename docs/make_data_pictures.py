@@ -1,10 +1,10 @@
-"""Make layouts.png, episode.png and episode.webp beside this file, of the twins of the project's own samples.
+"""Make layouts.png, episode.png and episode.webp beside this file from twins of the project's samples.
 
     manitwin build samples/samples.csv -o demo
     python docs/make_data_pictures.py demo
 
-layouts.png shows a layout on each kind of furniture, its depth, normals and instance ids; episode.png moments of one episode
-from three cameras; episode.webp the whole of it.
+layouts.png shows a layout on each kind of furniture with depth, normals and instance ids; episode.png shows moments of one
+episode from three cameras; episode.webp shows the whole episode.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ SEED = 3
 
 
 def sheet(rows: list[list[np.ndarray]]) -> Image.Image:
-    """Return pictures of one size as a table, with thin white lines between them."""
+    """Return pictures of equal size as a grid with thin white lines."""
     height, width, _ = rows[0][0].shape
     page = Image.new("RGB", (len(rows[0]) * (width + 4) - 4, len(rows) * (height + 4) - 4), "white")
     for y, row in enumerate(rows):
@@ -52,7 +52,7 @@ def sheet(rows: list[list[np.ndarray]]) -> Image.Image:
 
 
 def layouts(twins: Path, work: Path) -> tuple[Image.Image, dict[str, str]]:
-    """Draw a layout on a table, a tray and a shelf: colours, depth, normals, ids; returns it and the scenes' digests."""
+    """Draw a layout on a table, a tray and a shelf: colours, depth, normals, ids; return the picture and the scenes' digests."""
     rows, shown = [], {}
     source = TwinSource(twins)
     for surface in ("table", "tray", "shelf"):
@@ -89,7 +89,7 @@ def an_episode(twins: Path, work: Path) -> StoredEpisode:
 
 
 def episode_picture(episode: StoredEpisode, twins: Path) -> Image.Image:
-    """Draw moments of an episode, a row for each camera."""
+    """Draw moments of an episode, one row per camera."""
     frames = pictures(episode, twins, TILE_PX)
     moments = np.linspace(10, len(frames) - 1, MOMENTS).astype(int)
     return sheet([[frames[m][camera] for m in moments] for camera in range(len(CAMERAS))])

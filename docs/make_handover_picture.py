@@ -1,9 +1,9 @@
-"""Make handover.png beside this file: moments of a handover, from the side.
+"""Make handover.png beside this file: moments of a handover from the side.
 
     manitwin build --quick --text "a hammer" -o HAMMER
     python docs/make_handover_picture.py HAMMER
 
-Lifted, at the meeting, taken, let go by the first hand, and put down by the second.
+The moments: lifted, at the meeting point, grasped by the second hand, released by the first, and put down.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ SEED, ATTEMPTS = 5, 3
 
 
 def moments(recording: Recording) -> list[int]:
-    """Return the states that are shown: the ends of phases, in their order."""
+    """Return the shown states, the ends of phases in order."""
 
     def last(phase: Phase) -> int:
         return int(np.flatnonzero(recording.phase == phase)[-1])
 
     retreats = np.flatnonzero(recording.phase == Phase.RETREAT)
-    withdrawn = int(retreats[np.flatnonzero(np.diff(retreats) > 1)[0]])  # the first of two
+    withdrawn = int(retreats[np.flatnonzero(np.diff(retreats) > 1)[0]])  # the first of two retreats
     return [last(Phase.LIFT), last(Phase.ACT), last(Phase.CLOSE), withdrawn, last(Phase.LOWER)]
 
 
 def row(episode: StoredEpisode, twins: Path) -> np.ndarray:
-    """Draw the moments beside one another."""
+    """Draw the moments side by side."""
     recording, source = episode.recording, TwinSource(twins)
     visuals = [twin_drawable(source.folder(thing.twin_id)) for thing in episode.objects]
     furniture = Furniture(**episode.facts["furniture"])

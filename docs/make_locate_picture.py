@@ -1,10 +1,10 @@
-"""Make locate.png beside this file: what ``manitwin locate`` answers of drawn scenes under the noise of a depth camera.
+"""Make locate.png beside this file: results of ``manitwin locate`` in rendered scenes with depth camera noise.
 
     manitwin layout DATASET -n 10 --clutter dense --objects 7..9 --pictures --seed 202 -o SCENES
     python docs/make_locate_picture.py DATASET SCENES
 
-The first thing of the scenes that is found though more than a third of it is hidden, the first that is ambiguous, and the first
-of which all is seen.
+It shows the first object that is found although more than a third of it is hidden, the first ambiguous one, and the first that is
+completely visible.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ WIDTH_PX, LEAST_PX = 640, 600
 
 
 def answers(dataset: Path, scenes: Path) -> Iterator[tuple[float, Location, np.ndarray, str]]:
-    """Yield the visible share of each thing, the answer, its overlay and the twin's category."""
+    """Yield for each object its visible share, the result, the overlay and the category."""
     source, rng = TwinSource(dataset), np.random.default_rng(0)
     for file in sorted(scenes.glob("scenes/*/*/scene.json")):
         truth = read_scene_truth(file)

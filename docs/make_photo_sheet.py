@@ -1,9 +1,10 @@
-"""Make photo_sheet.png beside this file: made photos of known things, and what was built of each, from the front and the side.
+"""Make photo_sheet.png beside this file: rendered photos of known objects, and the twins built from them.
 
     python benchmarks/photo_generation.py OUT --every 7 --seeds 5 --held-out
     python docs/make_photo_sheet.py OUT
 
-One photo a thing, the first that was accepted. A frame says how much of the true volume the shape shares (IoU): red below 0.6.
+One photo per category, the first that was accepted, beside the twin from the front and the side. The frame's colour shows the
+volumetric overlap with the true shape (IoU), red below 0.6.
 """
 
 from __future__ import annotations
@@ -28,17 +29,17 @@ COLORS = 128
 POOR_IOU = 0.6
 GOOD, POOR = (150, 190, 150), (214, 60, 50)
 LIMIT_BYTES = 300_000
-SEEN_FROM_DEG = ((-90.0, 25.0), (0.0, 25.0))  # azimuth and elevation: templates look towards -Y
+SEEN_FROM_DEG = ((-90.0, 25.0), (0.0, 25.0))  # azimuth and elevation; the front of templates is -Y
 
 
 def shown(out: Path, row: dict[str, str]) -> np.ndarray:
-    """Return a photo beside two pictures of what was built of it, framed by how good it is, with its name."""
+    """Return a photo beside two views of its twin, with its name, framed by quality."""
     name = f"{json.loads(row['category']).replace(' ', '_')}-{row['seed']}-{float(row['elevation_deg']):.0f}"
     photo = read_image(out / f"{name}.png").pixels[..., :3]
     parts = read_glb(out / f"{name}.glb")
     points = np.concatenate([part.vertices for part in parts])
     center = points.mean(0)
-    turned = (points - center)[:, [1, 0, 2]] * [-1, 1, 1] + center  # both pictures at one scale
+    turned = (points - center)[:, [1, 0, 2]] * [-1, 1, 1] + center  # both views at one scale
     both = np.concatenate([points, turned])
     cameras = [
         framing_camera(both, azimuth_deg=a, elevation_deg=e, fov_y_deg=30, width_px=TILE_PX, height_px=TILE_PX)
@@ -61,7 +62,7 @@ def shown(out: Path, row: dict[str, str]) -> np.ndarray:
 
 
 def main() -> None:
-    """Draw the sheet and print which things are poor."""
+    """Draw the sheet and print the poor categories."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
     out = parser.parse_args().out

@@ -1,8 +1,8 @@
-"""Make the pictures of the documentation: frames.png, cards.png, grippers.png and questions.png, beside this file.
+"""Make the pictures of the documentation beside this file: frames.png, cards.png, grippers.png and questions.png.
 
-frames.png shows every frame of a twin on one mug: the object frame, the grasp frame, the plane of a placement, and the
-axes that a GLB file has. cards.png shows the cards of the two samples, grippers.png every shipped gripper on the mug,
-questions.png what a vision-language model sees of it to choose grasp points.
+frames.png shows every frame of a twin on a mug: object frame, grasp frame, placement plane, and the axes of a GLB file. cards.png
+shows the cards of the two samples, grippers.png every shipped gripper on the mug, questions.png the pictures from which a
+vision-language model chooses grasp points.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ the object (collision_radius_m)"""
 
 
 def mug() -> list[trimesh.Trimesh]:
-    """Return the sample mug, or where the samples have not been made yet one of a profile turned about Z and a ring."""
+    """Return the sample mug or, if the samples have not been made yet, a revolved profile with a ring."""
     if MUG.is_file():
         return read_glb(MUG)
     profile = [[0, 0], [0.036, 0], [0.040, 0.004], [0.040, 0.095], [0.0365, 0.095], [0.0365, 0.008], [0, 0.006]]
@@ -77,7 +77,7 @@ def mug() -> list[trimesh.Trimesh]:
 
 
 def axes(frame_to_object: np.ndarray, length: float) -> list[trimesh.Trimesh]:
-    """Return three arrows, red X, green Y, blue Z."""
+    """Return three arrows: red X, green Y, blue Z."""
     result = []
     for axis, color in enumerate(AXIS_COLORS):
         shaft = trimesh.creation.cylinder(0.0013, length * 0.84, sections=24)
@@ -91,7 +91,7 @@ def axes(frame_to_object: np.ndarray, length: float) -> list[trimesh.Trimesh]:
 
 
 def rim_grasp(gripper: Gripper, extents: np.ndarray, part: trimesh.Trimesh) -> tuple[np.ndarray, float]:
-    """Return a grasp of the rim from above: ``gripper_to_object`` and the width of the wall that it holds."""
+    """Return a grasp of the rim from above: ``gripper_to_object`` and the width of the held wall."""
     rim = float(extents[2])
     across = trimesh.intersections.mesh_plane(part, [0, 0, 1], [0, 0, rim - 0.012]).reshape(-1, 3)
     near = across[(np.abs(across[:, 0]) < 0.004) & (across[:, 1] < 0)]
@@ -119,7 +119,7 @@ def _letters(draw: ImageDraw.ImageDraw, camera: Camera, frame_to_object: np.ndar
 
 
 def _note(draw: ImageDraw.ImageDraw, at: tuple[float, float], corner: tuple[int, int], text: str) -> None:
-    """Write a title and lines at a corner, with a line to the place they speak of."""
+    """Write a title and lines at a corner, with a leader line to the described point."""
     title, *lines = text.splitlines()
     x, y = corner
     width = max(_font(26).getlength(title), *(_font(18).getlength(line) for line in lines))
@@ -150,7 +150,7 @@ def frames_picture() -> Image.Image:
     arrows = axes(np.eye(4), AXIS_M) + axes(gripper_to_object, AXIS_M)
     front = renderer.render(arrows, [camera], background=white)[0]
     cover = front.coverage[..., None]
-    # The hand is seen through, and the axes through everything.
+    # The hand is translucent, and the axes are drawn on top.
     under = 0.45 * bare + 0.55 * held
     picture = Image.fromarray(
         np.rint(under * (1 - cover) + (front.rgb - 255.0 * (1 - cover))).clip(0, 255).astype(np.uint8)
@@ -172,7 +172,7 @@ def frames_picture() -> Image.Image:
 
 
 def _gltf_inset(draw: ImageDraw.ImageDraw, camera: Camera) -> None:
-    """Draw the axes of GLB files, seen from the same side, and say how they follow from the object's."""
+    """Draw the axes of GLB files from the same viewpoint, with the conversion from object axes."""
     x, y, length = 1270.0, 180.0, 62.0
     for axis, color in enumerate(AXIS_COLORS):
         direction = OBJECT_TO_GLTF[:3, :3].T[:, axis] @ camera.camera_to_object[:3, :3]
@@ -186,7 +186,7 @@ def _gltf_inset(draw: ImageDraw.ImageDraw, camera: Camera) -> None:
 
 
 def grippers_picture() -> Image.Image:
-    """Draw every shipped gripper as it holds the mug, at one scale."""
+    """Draw every shipped gripper holding the mug, at one scale."""
     parts = mug()
     whole = merged(parts)
     drawn = [(name, _held(load_gripper(name), whole)) for name in shipped_grippers()]
@@ -212,7 +212,7 @@ def grippers_picture() -> Image.Image:
 
 
 def _held(gripper: Gripper, whole: trimesh.Trimesh) -> list[trimesh.Trimesh]:
-    """Return a gripper's parts where it holds the mug: jaws at the rim, a cup and a hand at the side without a handle."""
+    """Return a gripper's parts in its grasp of the mug: jaws at the rim, suction cup and hand at the side without handle."""
     radius, height = float(whole.extents[1]) / 2, float(whole.extents[2])
     if isinstance(gripper, SuctionGripper):
         lip = trimesh.creation.cone(gripper.lip_radius_m, 0.02, sections=64)
@@ -226,14 +226,14 @@ def _held(gripper: Gripper, whole: trimesh.Trimesh) -> list[trimesh.Trimesh]:
 
 
 def _from_the_side(x: float, z: float) -> np.ndarray:
-    """Return a grasp's pose with its origin at (x, 0, z), that approaches along +X and closes along Y."""
+    """Return a grasp pose with its origin at (x, 0, z) that approaches along +X and closes along Y."""
     return transform(np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([x, 0, z]))
 
 
 def _held_in_hand(
     hand: MultiFingerGripper, whole: trimesh.Trimesh, radius: float, height: float
 ) -> list[trimesh.Trimesh]:
-    """Close the first posture around the mug's body until it touches."""
+    """Close the first posture around the mug's body until contact."""
     body = HandCollision((np.array(trimesh.creation.cylinder(radius, height, sections=48).vertices),))
     posture = hand.postures[0]
     pose = _from_the_side(-radius - hand.palm_front_m - 0.006, 0.0)
@@ -256,7 +256,7 @@ def _held_in_hand(
 
 
 def cards_picture(twins: list[manitwin.Twin]) -> Image.Image:
-    """Put the cards of twins under one another."""
+    """Stack the cards of twins vertically."""
     cards = [Image.open(twin.folder / "card.png").convert("RGB") for twin in twins]
     width, height = cards[0].size
     picture = Image.new("RGB", (width, height * len(cards)), "white")
@@ -266,19 +266,19 @@ def cards_picture(twins: list[manitwin.Twin]) -> Image.Image:
 
 
 def sample_twins(folder: Path) -> list[manitwin.Twin]:
-    """Build the project's own samples; returns them by name."""
+    """Build the project's samples and return the twins sorted by name."""
     report = manitwin.build(DOCS.parent / "samples" / "samples.csv", folder)
     twins = [manitwin.load(result.folder) for result in report.results if result.folder is not None]
     return sorted(twins, key=lambda twin: twin.record.name or "")
 
 
 def made_of_twins(twins: list[manitwin.Twin]) -> dict[str, str]:
-    """Return the digests of twins' records by their names."""
+    """Return the digests of twins' records by name."""
     return {twin.record.name or twin.record.twin_id: of_twin(twin.record) for twin in twins}
 
 
 def questions_picture() -> Image.Image:
-    """Show what a model sees of the sample mug to choose grasp points: clean and marked, and how the marks move by vote."""
+    """Show the pictures from which a model chooses grasp points on the sample mug: clean, marked, and with rearranged markers."""
     with tempfile.TemporaryDirectory() as folder:
         report = manitwin.build(MUG, folder, name="mug", quick=True)
         asked = questions_about(report.results[0].folder or Path(), BuildConfig(), "openai:MODEL")
@@ -287,7 +287,7 @@ def questions_picture() -> Image.Image:
         (4, 0),
         (4, 1),
         (5, 1),
-    ):  # the first two grasp queries; of each view the clean one goes first
+    ):  # the first two grasp queries; the clean picture of each view comes first
         pictures = [part.png for part in asked.questions[number].question.parts if isinstance(part, ChatPicture)]
         one = Image.open(io.BytesIO(pictures[picture])).convert("RGB")
         shown.append(ImageOps.pad(one, (QUESTION_PX, QUESTION_PX), color="white"))

@@ -1,4 +1,4 @@
-"""Make films/SKILL.webp beside this file: an episode of each skill, seen from near the place where it happens.
+r"""Make films/SKILL.webp beside this file: a close-up animation of an episode of each skill.
 
     manitwin build --quick --text "a mug" --text "a mixing bowl" --text "a wooden spoon" --text "a hammer" \
         --text "a remote control" --text "a sponge" --text "a chef's knife" --text "a spray bottle" --text "a screwdriver" \
@@ -7,8 +7,8 @@
     manitwin build --quick --text "a bowl" --text "a marker" -o TO_STIR
     python docs/make_skill_films.py TO_STIR --skills stir
 
-Each is the first kept episode of a few attempts, shown at three times its speed, and films/films.json says of which objects
-and which motion of the arm it is.
+Each shows the first kept episode of a few attempts at three times its speed. films/films.json records the objects and the motion
+of the arm.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from manitwin.twin.loaded_twin import TwinSource
 FILMS = Path(__file__).resolve().parent / "films"
 RECORD = FILMS / "films.json"
 SIZE_PX, EVERY, SPEED, QUALITY = 224, 5, 3.0, 45
-STILL, STILL_FRAMES = 0.1, 2  # the mean difference of two pictures that look the same, and half a second
+STILL, STILL_FRAMES = 0.1, 2  # mean difference of equal-looking pictures, and half a second
 SEED, ATTEMPTS, TRIES = 7, 4, 4
 TARGETS = {
     "pick_place": "mug",
@@ -55,13 +55,13 @@ TARGETS = {
     "upright": "bottle",
     "handover": "hammer",
     "lift": "mug",
-}  # of skills that take anything, what shows them best; each twin is then tried once a seed
-EYE = np.array([0.45, -0.85, 0.55])  # from what is shown, in a direction that an arm at the origin does not hide
-LEAST_WAY_M, WAY_SHARE = 0.45, 1.5  # of the camera from there, and by how far all of it reaches
+}  # best targets of skills that accept any; each twin is tried once per seed
+EYE = np.array([0.45, -0.85, 0.55])  # from the scene, unobstructed by an arm at the origin
+LEAST_WAY_M, WAY_SHARE = 0.45, 1.5  # minimum distance of the camera, and its ratio to the extent of the scene
 
 
 def an_episode(twins: Path, skill: str) -> StoredEpisode:
-    """Record a few episodes of a skill, with one seed after the other, until one is kept; raises LookupError where none is."""
+    """Record episodes of a skill with successive seeds until one is kept; raises LookupError if none is."""
     wanted = TARGETS.get(skill)
     count = ATTEMPTS if wanted is None else len(pool_of(str(twins)).twins)
     for number in range(TRIES):
@@ -75,7 +75,7 @@ def an_episode(twins: Path, skill: str) -> StoredEpisode:
 
 
 def camera_for(recording: Recording) -> NamedCamera:
-    """Return a camera that sees all objects and where the hands go."""
+    """Return a camera that sees all objects and the paths of the hands."""
     arms, things = recording.tip_position_m.shape[1] // 3, recording.object_positions_m.shape[1]
     objects = [recording.object_positions_m[:, number] for number in range(things)]
     places = [*objects, *np.split(recording.tip_position_m, arms, axis=1)]
@@ -107,7 +107,7 @@ def film(episode: StoredEpisode, twins: Path) -> list[np.ndarray]:
 
 
 def until_still(pictures: list[np.ndarray]) -> list[np.ndarray]:
-    """Leave out the end, but half a second, in which nothing moves: what is kept in the hand is watched for two seconds."""
+    """Cut the motionless end to half a second; an object kept in the hand is observed for two seconds."""
     moves = [k for k, each in enumerate(pictures) if np.abs(each.astype(float) - pictures[-1]).mean() > STILL]
     return pictures[: max(moves, default=-1) + 1 + STILL_FRAMES]
 

@@ -1,9 +1,9 @@
-"""Make skills.png beside this file: moments of an episode of each skill that uses a tool, seen from near.
+"""Make skills.png beside this file: close-up moments of an episode of each tool skill.
 
     manitwin build --quick --text "a sponge" --text "a chef's knife" --text "a spray bottle" -o TOOLS
     python docs/make_skills_picture.py TOOLS
 
-A row each: wiping, a cut as a motion, aiming; taken, and at four moments of the act.
+One row each for wiping, a cutting motion and aiming: the lifted tool, and four moments of the action.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ EYES_M = {
     "wipe": (0.65, -0.35, 0.35),
     "cut_motion": (0.65, -0.35, 0.35),
     "aim": (-0.1, 0.7, 0.35),
-}  # from what is shown
+}  # relative to the subject
 UP_M = 0.06
 SEED, ATTEMPTS = 5, 3  # each twin once
 
@@ -51,7 +51,7 @@ def an_episode(twins: Path, work: Path, skill: str) -> StoredEpisode:
 
 
 def moments(episode: StoredEpisode, twins: Path, skill: str) -> np.ndarray:
-    """Draw a row: the thing in the hand, and moments of the act, from beside where it is done."""
+    """Draw a row: the object in the hand, and moments of the action from beside it."""
     recording, source = episode.recording, TwinSource(twins)
     acting = np.flatnonzero(np.isin(recording.phase, [Phase.ACT, Phase.HOLD])) + 1
     shown = [

@@ -1,7 +1,7 @@
-"""Write docs/templates.md from the templates themselves, so that the page cannot be out of date.
+"""Generate docs/templates.md from the templates.
 
 python docs/make_templates_page.py            writes the page
-python docs/make_templates_page.py --check    exits 1 where the page differs
+python docs/make_templates_page.py --check    exits with status 1 if the page is out of date
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Make the pictures of docs/view.md beside this file: pages of a data set in a Chromium, for who has one (``make browser``).
+"""Make the pictures of docs/view.md beside this file: pages of a data set in a Chromium browser (``make browser``).
 
     manitwin view DATASET --no-browser
     python docs/make_view_pictures.py LINK TWIN_ID
@@ -11,7 +11,7 @@
     manitwin review cutouts DATASET --draw --no-browser
     python docs/make_view_pictures.py LINK TWIN_ID --outline 60,29 83,32 81,48 77,71 66,68 --said "playing cards" 9
 
-``LINK`` is the link of one use that the command prints.
+``LINK`` is the one-time link that the command prints.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chro
 WIDE, NARROW, SCENE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}, {"width": 1280, "height": 720}
 EPISODE = {"width": 1280, "height": 965}
 MOMENT_S, TRIAL_S = 4.2, 1.3
-"""Of an episode and of a trial: the thing is in the hand then, or goes up."""
+"""Times of an episode and of a trial at which the object is held or lifted."""
 WITHOUT_GPU = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 
 
 def shown(page: Any, address: str, size: dict[str, int], scheme: str) -> Image.Image:
-    """Return what a page looks like on a screen."""
+    """Return a screenshot of a page."""
     page.set_viewport_size(size)
     page.emulate_media(color_scheme=scheme)
     page.goto("about:blank")
@@ -49,11 +49,11 @@ def shown(page: Any, address: str, size: dict[str, int], scheme: str) -> Image.I
 
 
 def judged(page: Any, address: str) -> Image.Image:
-    """Return what a page of a review looks like while a functional point is moved to another candidate."""
+    """Return a screenshot of a review page while a functional point is moved to another candidate."""
     page.set_viewport_size(WIDE)
     page.goto(address, wait_until="networkidle")
     page.wait_for_selector("#viewer[data-ready]")
-    page.keyboard.press("1")  # takes up no draft of another visit
+    page.keyboard.press("1")  # ignores drafts of earlier visits
     for key in ("y", "y", "n"):
         page.keyboard.press(key)
     page.wait_for_timeout(800)
@@ -61,9 +61,9 @@ def judged(page: Any, address: str) -> Image.Image:
 
 
 def drawn(page: Any, address: str, corners: list[str], said: list[str]) -> Image.Image:
-    """Return what the page of an outline looks like while ``corners``, in percent of the photo, are drawn.
+    """Return a screenshot of an outline page while ``corners``, in percent of the photo, are drawn.
 
-    ``said`` is what is typed before: a name, and a longest side in centimetres.
+    ``said`` is typed first: a name, and a longest side in centimetres.
     """
     page.set_viewport_size(WIDE)
     page.goto(address, wait_until="networkidle")
@@ -80,7 +80,7 @@ def drawn(page: Any, address: str, corners: list[str], said: list[str]) -> Image
 
 
 def beside(pictures: list[Image.Image]) -> Image.Image:
-    """Return pictures of one height beside each other."""
+    """Return pictures of equal height side by side."""
     together = Image.new(
         "RGB", (sum(each.width for each in pictures) + 12 * (len(pictures) - 1), pictures[0].height), "grey"
     )

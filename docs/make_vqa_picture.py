@@ -1,10 +1,10 @@
-"""Make vqa.png beside this file: a question of each category that ``manitwin vqa`` asks, with its answer.
+"""Make vqa.png beside this file: sample questions of ``manitwin vqa`` with their answers.
 
     manitwin layout DATASET -n 8 --objects 6..10 --pictures --seed 11 -o DRAWN
     manitwin vqa DRAWN -o QUESTIONS --per-scene 60
     python docs/make_vqa_picture.py QUESTIONS
 
-Of each family that is named below the first question is shown whose picture has not been shown yet.
+For each family named below, the first question with a picture not yet shown is used.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ MARK, INK, QUIET, COLORS = (222, 32, 60), (20, 20, 20), (110, 110, 110), 192
 
 
 def numbered(text: str) -> str:
-    """Return a text with places as the numbers that are drawn: ``<p0>`` is #1."""
+    """Return a text with point references replaced by the drawn numbers: ``<p0>`` becomes #1."""
     return re.sub(r"<[pb](\d+)>", lambda found: f"#{int(found[1]) + 1}", text)
 
 
 def tile(question: dict[str, Any], picture: Image.Image) -> Image.Image:
-    """Draw a question's picture with its places, its words and its answer below."""
+    """Draw a question's picture with its points, and its text and answer below."""
     made = Image.new("RGB", (TILE_PX, TILE_PX + TEXT_PX), "white")
     made.paste(picture.resize((TILE_PX, TILE_PX), Image.Resampling.LANCZOS))
     draw, font = ImageDraw.Draw(made), ImageFont.load_default(13)
@@ -53,7 +53,7 @@ def tile(question: dict[str, Any], picture: Image.Image) -> Image.Image:
 
 
 def main() -> None:
-    """Draw the samples of the folder that is named."""
+    """Draw the samples of the given folder."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("questions", type=Path)
     folder = parser.parse_args().questions

@@ -1,6 +1,6 @@
-"""Directives that write reference pages from the code: ``public-api``, ``commands`` and ``records``.
+"""Sphinx directives that generate reference pages from the code: ``public-api``, ``commands`` and ``records``.
 
-The pages are made while the site is built, so that they cannot be out of date, and are in no commit.
+The pages are generated at build time and are not committed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from manitwin.errors import ManiTwinError
 
 
 def public_api_markdown(names: list[str]) -> str:
-    """Return a section for every public name: functions, classes with their members, and which other pages have the rest."""
+    """Return a section for every public name: functions, classes with members, values, and references to the other pages."""
     functions, classes, values, elsewhere = [], [], [], []
     for name in names:
         found = getattr(manitwin, name)
@@ -46,7 +46,7 @@ def _documented(directive: str, target: str, options: str = "") -> str:
 
 
 def commands_markdown() -> str:
-    """Return the options of every command that is not hidden, as typer's own `utils docs` writes them."""
+    """Return the options of every visible command, as written by typer's `utils docs`."""
     from typer.cli import get_docs_for_click
 
     from manitwin.cli.main import app
@@ -55,11 +55,11 @@ def commands_markdown() -> str:
     command.commands = {name: each for name, each in command.commands.items() if not each.hidden}
     text = get_docs_for_click(obj=command, ctx=typer.Context(command), name="manitwin")
     text = html.unescape(text).replace("```console\n$ ", "```text\n")
-    return text.split("\n", 1)[1]  # its title is the page's
+    return text.split("\n", 1)[1]  # without its title, which the page already has
 
 
 def records_markdown(module_name: str) -> str:
-    """Return the records that a module defines: what each says, and its fields with their types as they are written there."""
+    """Return the records of a module: descriptions, and fields with their types as written in the source."""
     module = import_module(module_name)
     kinds = [
         kind
@@ -85,14 +85,14 @@ def _default(field: FieldInfo) -> str:
 
 
 class PublicApi(SphinxDirective):
-    """``public-api``: the reference of everything in ``manitwin.__all__``."""
+    """``public-api``: reference of all names in ``manitwin.__all__``."""
 
     def run(self) -> list[nodes.Node]:
         return self.parse_text_to_nodes(public_api_markdown(sorted(manitwin.__all__)), allow_section_headings=True)
 
 
 class Commands(SphinxDirective):
-    """``commands``: the reference of the command line."""
+    """``commands``: reference of the command line."""
 
     def run(self) -> list[nodes.Node]:
         return self.parse_text_to_nodes(commands_markdown(), allow_section_headings=True)
@@ -108,9 +108,9 @@ class Records(SphinxDirective):
 
 
 def resolve_short_name(app: Sphinx, env: Any, node: Any, contnode: Any) -> Any:
-    """Return the reference to the documented object whose last name this is, where it is the only one.
+    """Return the reference to a documented object by its unique last name.
 
-    Annotations name a class where it is defined or as it was imported; its page has it under the name that users import.
+    Annotations name a class by its defining or importing module, while its page documents it under the public name.
     """
     if node.get("refdomain") != "py":
         return None
@@ -125,7 +125,7 @@ def resolve_short_name(app: Sphinx, env: Any, node: Any, contnode: Any) -> Any:
 
 
 def skip_generated_constructors(app: Sphinx, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
-    """Skip constructors that nobody wrote (a dataclass's, a protocol's): their arguments are the fields below."""
+    """Skip generated constructors (of dataclasses and protocols), whose arguments are documented as fields."""
     inherited = ("Initialize self.", "Create and return a new object.", "Create a new model", "Create new instance")
     words = getattr(obj, "__doc__", None) or ""
     return True if name in ("__init__", "__new__") and (not words or words.startswith(inherited)) else None

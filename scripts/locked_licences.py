@@ -1,8 +1,8 @@
-"""Print the licence of every locked package, as an SPDX expression, and where it is stated; fail where one is not allowed.
+"""Print the licence of every locked package as an SPDX expression with its source; fail if one is not allowed.
 
-``make licences``. A licence is read from the metadata of the installed wheel. Where the metadata name none, or a family of
-licences only ("BSD"), it was read from the licence file in the wheel, and stands in ``READ`` with that file's name. A package
-of which neither is known is an error, and so is a licence that nobody has allowed.
+``make licences``. A licence is read from the metadata of the installed wheel. If the metadata name none, or only a family of
+licences ("BSD"), it was read from the licence file in the wheel and is listed in ``READ`` with that file's name. Packages without
+a known licence, and licences that are not in ``ALLOWED``, are errors.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ ALLOWED = frozenset(
         "Zlib",
     )
 )
-"""What a locked package may be under: permissive licences, and those with a copyleft that ends at their own files."""
+"""Licences allowed for locked packages: permissive ones, and file-level copyleft."""
 
 SAID = {
     "3-clause bsd license": "BSD-3-Clause",
@@ -61,14 +61,14 @@ SAID = {
     "mozilla public license 2.0 (mpl 2.0)": "MPL-2.0",
     "psf": "PSF-2.0",
 }
-"""Names in metadata that mean one licence. "BSD" and "LGPL" are not among them: each is a family."""
+"""Unambiguous licence names in metadata. "BSD" and "LGPL" are not listed, since each is a family."""
 
 READ = {
     "alabaster": ("BSD-3-Clause", "LICENSE.rst"),
     "antlr4-python3-runtime": ("BSD-3-Clause", "antlr4/Parser.py"),
     "assimp-py": ("BSD-3-Clause", "licenses/src/assimp/LICENSE"),  # the bindings are under MIT (licenses/LICENSE)
     "assimp-py==1.2.0": ("BSD-3-Clause", "licenses/licenses/assimp-LICENSE"),
-    "cascadio": ("MIT", "METADATA"),  # its own; OpenCASCADE in it is under LGPL 2.1 with an exception
+    "cascadio": ("MIT", "METADATA"),  # its own; the bundled OpenCASCADE is under LGPL 2.1 with an exception
     "cmeel-qhull": ("Qhull", "licenses/qhull/COPYING.txt"),
     "comm": ("BSD-3-Clause", "licenses/LICENSE"),
     "contourpy": ("BSD-3-Clause", "LICENSE"),
@@ -110,12 +110,11 @@ READ = {
     "transforms3d": ("BSD-3-Clause", "LICENSE"),
     "webencodings": ("BSD-3-Clause", "licenses/LICENSE"),
 }
-"""Licences read by a person, each with the file of the wheel that states it; of a version, where its file is another.
+"""Licences read manually, with the file of the wheel that states them, per version if the files differ.
 
-``LicenseRef-BSD``: the classifier says BSD, and the wheel has no text that says of how many clauses.
-That of pycocotools is called FreeBSD, which is the one of two. ``LicenseRef-matplotlib``:
-matplotlib's own, modelled on the PSF's. docutils' emacs mode, under the GPL, is not in its wheel. The wheel of Pebble names
-the LGPL and carries the text of version 3.
+``LicenseRef-BSD``: the classifier says BSD, and no text in the wheel gives the number of clauses. The licence of pycocotools is
+called FreeBSD, which is the two-clause variant. ``LicenseRef-matplotlib``: matplotlib's own, modelled on the PSF's. The emacs
+mode of docutils, under the GPL, is not in its wheel. The wheel of Pebble names the LGPL and has the text of version 3.
 """
 
 ELSEWHERE = {
@@ -126,9 +125,9 @@ ELSEWHERE = {
     "pywin32": "PSF-2.0",
     "tzdata": "Apache-2.0",
 }
-"""Packages that are locked for other systems (macOS, Windows, browsers) or some Pythons, by their wheels at PyPI.
+"""Licences of packages locked for other systems (macOS, Windows, browsers) or Python versions, from their wheels at PyPI.
 
-The set-up does not install them everywhere, and where it did, or another tool, the answer is the same.
+They are not installed everywhere; listing them here gives the same result on every system.
 """
 
 CARRIED = {
@@ -151,7 +150,7 @@ CARRIED = {
     "scipy": "libgfortran under the GPL-3.0 with the GCC runtime exception, libquadmath under the LGPL-2.1",
     "setuptools": "autocommand under the LGPL-3.0, among what it brings",
 }
-"""Wheels whose licence files hold the text, or name, of the GPL or the LGPL, and what that is of."""
+"""Wheels whose licence files contain or name the GPL or LGPL, and the component concerned."""
 
 
 TEXTS = ("", ".txt", ".md", ".rst")
@@ -159,7 +158,7 @@ TEXTS = ("", ".txt", ".md", ".rst")
 
 @dataclass(frozen=True)
 class Licence:
-    """What a package is under: ``expression`` is None where nothing says it, ``source`` is the file that says it."""
+    """The licence of a package; ``expression`` is None if unknown, ``source`` is the file that states it."""
 
     name: str
     version: str
@@ -168,7 +167,7 @@ class Licence:
 
     @property
     def not_allowed(self) -> list[str]:
-        """Licences of the expression that nobody has allowed; of a choice (OR), one that is allowed is enough."""
+        """Licences of the expression that are not allowed; for alternatives (OR), one allowed licence suffices."""
         if self.expression is None:
             return ["unknown"]
         return [
@@ -179,14 +178,14 @@ class Licence:
 
 
 def locked(text: str) -> list[tuple[str, str]]:
-    """Return name and version of each locked package; a name stands twice where versions differ between Pythons."""
+    """Return name and version of each locked package; a name occurs twice if versions differ between Python versions."""
     return [
         (name.lower(), version) for name, version in re.findall(r"^([A-Za-z0-9._-]+)==([^\s;\\]+)", text, re.MULTILINE)
     ]
 
 
 def stated(package: Distribution) -> str | None:
-    """Return the licence that the metadata of a wheel name as one expression, or None."""
+    """Return the licence stated in a wheel's metadata as an SPDX expression, or None."""
     metadata = package.metadata
     expression = metadata.get("License-Expression")
     if expression:
@@ -232,7 +231,7 @@ def licence_texts(package: Distribution) -> Iterator[tuple[str, str]]:
 
 
 def carries_copyleft(text: str) -> bool:
-    """Say whether a licence text is the GPL's or LGPL's, or puts something under one of them."""
+    """Return whether a text is the GPL or LGPL, or places something under them."""
     return bool(
         re.search(r"GNU\s+(LESSER |LIBRARY |AFFERO )?GENERAL PUBLIC LICENSE\s+Version \d", text, re.IGNORECASE)
         or re.search(r"\bL?GPL(v|-| )?[23](\.\d)?\b(?! \(\"Combined)", text)

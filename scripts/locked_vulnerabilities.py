@@ -1,7 +1,7 @@
-"""Ask the package index which known vulnerabilities (of PyPA's and GitHub's advisories) the locked packages have.
+"""Look up known vulnerabilities (PyPA and GitHub advisories) of the locked packages in the package index.
 
-``make vulnerabilities``. Exit status 1: some are known. 4: the index did not answer for each version, and what it was not asked
-of is named. An index that mirrors PyPI may know a package's newest version only; then an older one is not checked.
+``make vulnerabilities``. Exit status 1: some are known. 4: the index did not answer for every version; the versions that were not
+checked are listed. A mirror of PyPI may only know the newest version of a package; older versions are then not checked.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Fetch = Callable[[str], dict[str, Any] | None]
 
 @dataclass(frozen=True)
 class Known:
-    """What the index says of a version: ``advisories`` with the versions that mend them, or None where it says nothing."""
+    """Index data on a version: ``advisories`` with the versions that fix them, or None if the index has no data."""
 
     name: str
     version: str
@@ -34,7 +34,7 @@ class Known:
 
 
 def fetch(path: str) -> dict[str, Any] | None:
-    """Return the index's JSON of ``NAME/VERSION`` or ``NAME``, or None where it has none."""
+    """Return the index's JSON of ``NAME/VERSION`` or ``NAME``, or None if it has none."""
     try:
         answer = httpx2.get(f"{INDEX}/{path}/json", timeout=TIMEOUT_S, follow_redirects=True)
         return answer.json() if answer.status_code == 200 else None
@@ -43,7 +43,7 @@ def fetch(path: str) -> dict[str, Any] | None:
 
 
 def known(name: str, version: str, ask: Fetch = fetch) -> Known:
-    """Return what is known of a locked version, by its own page or, where it is the newest, by the project's."""
+    """Return the advisories on a locked version, from its own page or, for the newest version, from the project's."""
     for path in (f"{name}/{version}", name):
         page = ask(path)
         if page is not None and page["info"]["version"] == version and "vulnerabilities" in page:
@@ -53,7 +53,7 @@ def known(name: str, version: str, ask: Fetch = fetch) -> Known:
 
 
 def report(found: list[Known]) -> int:
-    """Print what is known, and return the exit status."""
+    """Print the results and return the exit status."""
     for package in found:
         for advisory, fixed in (package.advisories or {}).items():
             print(f"{package.name} {package.version}: {advisory}, mended in {', '.join(fixed) or 'no version'}")

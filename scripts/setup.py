@@ -1,8 +1,8 @@
-"""Set up everything in ``.venv``: the locked packages, this package, the system's libraries that they want, a Vulkan driver.
+"""Set up ``.venv``: the locked packages, this package, the system libraries that they need, and a Vulkan driver.
 
-Runs on the system's Python alone (3.11+), on Debian 12 and 13 and Ubuntu 24.04. The second run takes a second: a stamp in the
-environment holds the digest of the lock and of ``pyproject.toml``. What needs root is installed when it may be, else the one
-command to run is said.
+Runs with the system's Python alone (3.11+) on Debian 12 and 13 and Ubuntu 24.04. A second run takes a second: a stamp file in the
+environment holds the digest of the lock and of ``pyproject.toml``. Steps that need root are run if permitted; otherwise the
+required command is printed.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "src"))  # nothing is installed yet
+sys.path.insert(0, str(ROOT / "src"))  # the package is not installed yet
 
 from manitwin.formats.installation import missing_libraries, package_by_contents, package_by_policy  # noqa: E402
 
@@ -24,7 +24,7 @@ STAMP = VENV / "manitwin-setup.sha256"
 LIBRARIES_STAMP = VENV / "manitwin-libraries.sha256"
 BACKPORTS = Path("/etc/apt/sources.list.d/manitwin-backports.sources")
 ENVIRONMENT_BYTES = 3_800_000_000
-"""What the installed packages take (du of ``.venv``: 3.9e9); pip wants more while it installs."""
+"""Size of the installed packages (du of ``.venv``: 3.9e9); pip needs more during the installation."""
 
 
 def say(text: str) -> None:
@@ -36,7 +36,7 @@ def stop(text: str) -> None:
 
 
 def as_root(command: list[str]) -> list[str] | None:
-    """Return the command as this user may run it as root without a password, or None."""
+    """Return the command in the form that this user can run as root without a password, or None."""
     if os.geteuid() == 0:
         return command
     sudo = shutil.which("sudo")
@@ -57,7 +57,7 @@ def distribution() -> tuple[str, str]:
 
 
 def apt_install(packages: list[str], why: str, extra: list[str] | None = None, before: str = "") -> bool:
-    """Install Debian packages; where that is not allowed, say the one command that does. Returns whether they are there."""
+    """Install Debian packages, or print the command if not permitted. Returns whether they are installed."""
     arguments = ["apt-get", "install", "-y", "--no-install-recommends", *(extra or []), *packages]
     command = as_root(arguments)
     by_hand = f"{before}sudo apt-get update && sudo {' '.join(arguments)}"
@@ -76,7 +76,7 @@ def apt_install(packages: list[str], why: str, extra: list[str] | None = None, b
 
 
 def make_environment() -> None:
-    """Create the virtual environment, with pip in it."""
+    """Create the virtual environment with pip."""
     if (VENV / "bin" / "python").exists() and subprocess.run(
         [VENV / "bin" / "python", "-m", "pip", "--version"], capture_output=True
     ).returncode == 0:
@@ -93,13 +93,13 @@ def make_environment() -> None:
 
 
 def wanted_digest() -> str:
-    """Digest what decides the content of the environment."""
+    """Return the digest of the files that determine the content of the environment."""
     parts = [(ROOT / name).read_bytes() for name in ("requirements.lock", "pyproject.toml")]
     return hashlib.sha256(b"\0".join([*parts, sys.version.encode()])).hexdigest()
 
 
 def require_room() -> None:
-    """Stop where the packages cannot fit on the disk: pip finds that out after minutes of downloads."""
+    """Stop if the packages do not fit on the disk; pip would fail only after minutes of downloads."""
     there = sum(path.lstat().st_blocks for path in VENV.rglob("*")) * 512
     free = shutil.disk_usage(ROOT).free
     if free + there < ENVIRONMENT_BYTES:
@@ -110,7 +110,7 @@ def require_room() -> None:
 
 
 def install_packages() -> None:
-    """Install the locked packages, by hash, and this package in place."""
+    """Install the locked packages, verified by hash, and this package in editable mode."""
     digest = wanted_digest()
     if STAMP.is_file() and STAMP.read_text() == digest:
         return
@@ -128,18 +128,18 @@ def install_packages() -> None:
 
 
 def compile_sources() -> None:
-    """Write the bytecode of this package where it is missing or old.
+    """Compile this package's outdated or missing bytecode.
 
-    A program begins half a second sooner then. Python does so by itself, but not where PYTHONDONTWRITEBYTECODE is set, as it
-    often is in containers and on servers that run tests.
+    Programs then start half a second faster. Python does not do so itself if PYTHONDONTWRITEBYTECODE is set, as is common in
+    containers and on test servers.
     """
     subprocess.run([str(VENV / "bin" / "python"), "-m", "compileall", "-q", "-j", "0", str(ROOT / "src")], check=False)
 
 
 def install_libraries() -> None:
-    """Install the shared libraries of the system that the installed wheels want, as the loader tells.
+    """Install the system's shared libraries that the installed wheels need, according to the loader.
 
-    Asked again only where packages or the system's libraries have changed since.
+    The check is repeated only if packages or the system's libraries have changed.
     """
     known = subprocess.run(["/sbin/ldconfig", "-p"], capture_output=True).stdout
     digest = hashlib.sha256(wanted_digest().encode() + known).hexdigest()
@@ -165,7 +165,7 @@ def install_libraries() -> None:
 
 
 def packages_by_policy(libraries: list[str]) -> list[str]:
-    """Return the Debian packages named as Debian Policy names those of the libraries, where there are such packages."""
+    """Return the existing Debian packages with the names that Debian Policy gives to the libraries' packages."""
     update = as_root(["apt-get", "update", "-qq"])
     if update is not None:
         subprocess.run(update, capture_output=True)
@@ -174,7 +174,7 @@ def packages_by_policy(libraries: list[str]) -> list[str]:
 
 
 def packages_by_contents(libraries: list[str]) -> list[str]:
-    """Return the Debian packages that hold the libraries, by apt-file's index of all packages' files, which is installed."""
+    """Return the Debian packages that contain the libraries, by apt-file's index, which is installed if needed."""
     if not apt_install(["apt-file"], "apt-file is needed to find the packages of shared libraries"):
         sys.exit(1)
     subprocess.run(as_root(["apt-file", "update"]) or [], capture_output=True)
@@ -186,14 +186,14 @@ def packages_by_contents(libraries: list[str]) -> list[str]:
 
 
 def can_render() -> bool:
-    """Ask the package's own probe whether a Vulkan device can render: yes is a device's name, silence is no."""
+    """Return whether a Vulkan device can render, by the package's own probe, which prints the device's name."""
     probe = [str(VENV / "bin" / "python"), "-m", "manitwin.render.device"]
     done = subprocess.run(probe, capture_output=True, text=True)
     return done.returncode == 0 and bool(done.stdout.strip())
 
 
 def debian_mirror() -> str:
-    """Return the mirror that this system already installs Debian 12 from."""
+    """Return the Debian 12 mirror that this system uses."""
     ask = ["apt-get", "indextargets", "--format", "$(REPO_URI)", "Codename: bookworm"]
     known = subprocess.run(ask, capture_output=True, text=True).stdout.split()
     if not known:
@@ -202,7 +202,9 @@ def debian_mirror() -> str:
 
 
 def install_renderer() -> None:
-    """Install Mesa's lavapipe where no Vulkan device can render: from backports on Debian 12, whose own is too old."""
+    """Install Mesa's lavapipe if no Vulkan device can render; on Debian 12 from backports, since the version of bookworm is too
+    old.
+    """
     if can_render():
         return
     name, codename = distribution()

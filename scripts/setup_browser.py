@@ -1,7 +1,7 @@
-"""Install Chromium from the system's packages, for the tests marked browser. Run by make, with the Python of ``.venv``.
+"""Install Chromium from the system's packages for the tests marked browser. Run by make with the Python of ``.venv``.
 
-Playwright drives the system's own browser: its download of another is not used. Debian calls the package ``chromium``;
-where apt-get is missing, the line that is printed names what to install.
+Playwright drives the system's browser instead of downloading its own. On Debian the package is ``chromium``; without apt-get, a
+message names the package to install.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Set up an environment of its own for something that tests ask and that wants other versions than this package.
+"""Set up a separate environment for a program that tests use and that needs conflicting package versions.
 
     python scripts/setup_side_environment.py vlm | usd-validate | simready | lerobot
 
-Run by make, with the Python of ``.venv``. A second run takes no time: a stamp in the environment holds the digest of its lock.
+Run by make with the Python of ``.venv``. A second run returns at once: a stamp in the environment holds the digest of its lock.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 @dataclass(frozen=True)
 class Side:
-    """What is installed, for whom, and the line of Python that proves that it runs. ``gigabytes`` of disk were measured."""
+    """A side environment: description, lock file, a Python statement that verifies it, and its measured size in ``gigabytes``."""
 
     what: str
     lock: str
@@ -36,7 +36,7 @@ SIDES = {
     "vlm": Side(
         "the inference engine (vLLM on a processor) that the tests marked vlm_real ask",
         "tests/vlm_real/engine.lock",
-        # vLLM loads kernels by what the processor can do; without AVX2 there are none
+        # vLLM loads kernels by processor features; there are none without AVX2.
         "from vllm.platforms import current_platform as here; here.import_kernels(); import torch; torch.ops._C.rms_norm",
         5.2,
         x86_64_linux_only=True,
@@ -61,7 +61,7 @@ SIDES = {
         6.8,
     ),
 }
-SPARE = 1.5  # while it is installed
+SPARE = 1.5  # during the installation
 
 
 def stop(text: str) -> None:
@@ -69,13 +69,13 @@ def stop(text: str) -> None:
 
 
 def uv(*arguments: str) -> None:
-    """Run the uv of ``.venv``; what it says of a failure is shown."""
+    """Run the uv of ``.venv``; its error messages are shown."""
     if subprocess.run([str(Path(sys.executable).parent / "uv"), *arguments]).returncode != 0:
         stop("it could not be installed, for the reason above; mend it, then run the same command again")
 
 
 def check_machine(side: Side) -> None:
-    """Stop where there is no wheel, or no room."""
+    """Stop if there is no wheel for this platform, or not enough disk space."""
     if side.x86_64_linux_only and (sys.platform, platform.machine()) != ("linux", "x86_64"):
         stop(f"it runs on x86-64 Linux, this is {platform.machine()} {sys.platform}")
     free, needed = shutil.disk_usage(ROOT).free / 1e9, SPARE * side.gigabytes
