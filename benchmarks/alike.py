@@ -1,9 +1,10 @@
-"""How alike near-duplicates look, and other things: what the bars of ``collect add --alike`` are set by.
+"""Measure the similarity of near-duplicates and of different objects, from which the limits of ``collect add --alike`` are set.
 
 python benchmarks/alike.py FOLDER [--most N] [--seed N]
 
-Photos and meshes below a folder, each of another thing, changed as who passes such files on changes them, against the same
-unchanged, and against the others. Prints quantiles, and the shares beyond the bars.
+Takes the photos and meshes below a folder, which must all show different objects. Each file is altered in the ways in which files
+usually change when they are copied, and is compared with its altered copies and with the other files. Prints quantiles of the
+similarities and the share of pairs that reach the limit.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from manitwin.render.raycast import merged
 
 
 def changed_pictures(picture: Image.Image) -> list[Image.Image]:
-    """Return a picture smaller, compressed, cropped by 5 %, brighter, and with all of it."""
+    """Return altered copies of a picture: smaller, compressed, cropped by 5 %, brighter, and all of these together."""
     width, height = picture.size
     margin = (round(0.025 * width), round(0.025 * height), round(0.975 * width), round(0.975 * height))
     smaller, cropped = picture.resize((width // 2, height // 2)), picture.crop(margin)
@@ -34,14 +35,14 @@ def changed_pictures(picture: Image.Image) -> list[Image.Image]:
 
 
 def compressed(picture: Image.Image, quality: int) -> Image.Image:
-    """Return a picture after JPEG."""
+    """Return a picture after JPEG compression with the given quality (1 to 95)."""
     stream = io.BytesIO()
     picture.save(stream, "JPEG", quality=quality)
     return Image.open(stream).convert("RGB")
 
 
 def changed_meshes(mesh: trimesh.Trimesh, rng: np.random.Generator) -> list[trimesh.Trimesh]:
-    """Return a mesh turned and in another unit, with finer triangles, and with its vertices rounded."""
+    """Return altered copies of a mesh: rotated and in millimetres, subdivided, and with rounded vertices."""
     turned = mesh.copy()
     turned.apply_transform(trimesh.transformations.random_rotation_matrix(rng.random(3)))
     turned.apply_scale(1000.0)
@@ -51,7 +52,7 @@ def changed_meshes(mesh: trimesh.Trimesh, rng: np.random.Generator) -> list[trim
 
 
 def told(name: str, values: list[float], bar: float) -> None:
-    """Print what similarities amount to."""
+    """Print quantiles of similarities and the share of them that reaches ``bar``."""
     found = np.array(values)
     low, middle, high = np.quantile(found, [0.05, 0.5, 0.95])
     share = (found >= bar).mean()
@@ -61,7 +62,7 @@ def told(name: str, values: list[float], bar: float) -> None:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure the similarities and print them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--most", type=int, default=60)
@@ -95,7 +96,7 @@ def main() -> None:
 
 
 def drawn(files: list[Path], most: int, rng: np.random.Generator) -> list[Path]:
-    """Return so many files, drawn."""
+    """Return at most ``most`` files, drawn at random, in the order of ``files``."""
     return [files[place] for place in sorted(rng.permutation(len(files))[:most])]
 
 

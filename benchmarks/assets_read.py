@@ -1,7 +1,8 @@
-"""How many of the assets below folders are read: `python benchmarks/assets_read.py FOLDER... [--most N] [--seed S]`.
+"""Count how many of the assets below folders can be read: `python benchmarks/assets_read.py FOLDER... [--most N] [--seed S]`.
 
-A file that its makers call malformed or invalid, to test that loaders refuse it, is counted apart; every one that is not read is
-named with its cause. Of a folder with more assets than ``--most`` so many are drawn.
+Files whose name says that they are malformed or invalid on purpose, as tests of loaders have them, are counted separately. Every
+other asset that cannot be read is listed with its error. Of a folder with more than ``--most`` assets, that many are drawn at
+random.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""How long an audit of 1,000 assets takes: copies of a few twins, and of the same in other formats.
+"""Measure how long an audit of 1,000 assets takes: copies of a few twins, and copies of them in other formats.
 
 python benchmarks/audit.py DATASET                     every twin below, copied until there are 1,000 assets
 python benchmarks/audit.py DATASET --formats urdf,mjcf,robotwin     half of them exported to these formats
 
-Writes the copies to a temporary folder; prints CPU seconds (children included), wall time and the findings.
+Writes the copies to a temporary folder. Prints CPU seconds (child processes included), wall time and the findings.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import RECORD
 
 TWINS = 8
-"""Different ones that are copied."""
+"""Number of different twins that are copied."""
 
 
 def write_assets(dataset: Path, out: Path, count: int, formats: list[str]) -> None:
-    """Copy twins into ``out``, every second one as a twin and the others in the formats in turn."""
+    """Copy twins into ``out``, every second one as a twin and the others in the given formats in turn."""
     twins = sorted(path.parent for path in dataset.rglob(RECORD) if ".work" not in path.parts)
     accepted = [folder for folder in twins if Twin(folder).record.status == "accepted"][:TWINS]
     if not accepted:
@@ -51,13 +51,13 @@ def write_assets(dataset: Path, out: Path, count: int, formats: list[str]) -> No
 
 
 def cpu_seconds() -> float:
-    """Return the CPU seconds of this process and of its ended children."""
+    """Return the CPU seconds of this process and of its child processes that have ended."""
     use = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(each.ru_utime + each.ru_stime for each in use)
 
 
 def main() -> None:
-    """Write the assets, audit them, print the figures."""
+    """Write the assets, audit them and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("dataset", type=Path)
     parser.add_argument("--count", type=int, default=1000)

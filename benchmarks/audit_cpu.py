@@ -1,8 +1,8 @@
-"""What an audit of each asset below folders costs: `python benchmarks/audit_cpu.py FOLDER... [--most N] [--seed S]`.
+"""Measure the cost of auditing each asset below folders: `python benchmarks/audit_cpu.py FOLDER... [--most N] [--seed S]`.
 
-All rules, without engines, in one process that is warm, as the workers of an audit are. CPU seconds are of that process and
-of those that it starts, so that other work on the machine does not count; prints the median, the 90th percentile and the mean,
-of each folder and of all, and the dearest assets. Linux only.
+All rules are applied, without physics engines, in one warmed-up process, like a worker of an audit. CPU seconds are those of this
+process and of the processes that it starts, so that other load on the machine does not count. Prints the median, the 90th
+percentile and the mean for each folder and for all folders, and the most expensive assets. Runs on Linux only.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ TICKS = os.sysconf("SC_CLK_TCK")
 
 
 def cpu_seconds() -> float:
-    """Return the CPU seconds of this process and of all below it, those that have ended too."""
+    """Return the CPU seconds of this process and of all its descendants, including those that have ended."""
     return sum(_of(pid) for pid in _family(os.getpid()))
 
 
@@ -36,11 +36,11 @@ def _family(pid: int) -> list[int]:
 
 def _of(pid: int) -> float:
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return sum(map(int, fields[11:15])) / TICKS  # utime, stime, and those of ended children
+    return sum(map(int, fields[11:15])) / TICKS  # utime, stime, and the same of child processes that have ended
 
 
 def main() -> None:
-    """Audit the assets one after the other and print what each took."""
+    """Audit the assets one after the other and print the cost of each."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--most", type=int, default=100)
@@ -52,7 +52,7 @@ def main() -> None:
         found = list(find_assets(folder))
         if len(found) > options.most:
             found = sorted(random.Random(options.seed).sample(found, options.most))
-        if found and not warm:  # what is imported is of no asset
+        if found and not warm:  # the imports of the first audit are not counted
             audit_path(found[0], RULES, root=folder)
             warm = True
         took = []
@@ -68,7 +68,7 @@ def main() -> None:
 
 
 def said(seconds: list[float]) -> str:
-    """Return the figures of some assets in a line."""
+    """Return the statistics of some assets as one line of text."""
     if not seconds:
         return "no assets"
     tenths = statistics.quantiles(seconds, n=10)[-1] if len(seconds) > 1 else seconds[0]

@@ -1,10 +1,11 @@
-"""Build a twin of every mesh of a data folder and print what came of it, and what it cost.
+"""Build a twin of every mesh of a data folder, and print the results and their cost.
 
     python benchmarks/build_meshes.py DATA OUT [--jobs N] [--only NAME,NAME] [--quick] [--sample]
 
-DATA holds ``manifest.csv`` with the columns file, kind and category; meshes are taken as metric, named by their category.
-Objects without a twin or a grasp count as 0 of 100. CPU seconds are those of the worker, by stage, as run.json keeps them.
-Workers are forked as those of the command line are where NumPy has one thread (OPENBLAS_NUM_THREADS=1), and spawned elsewhere.
+DATA holds ``manifest.csv`` with the columns file, kind and category. Meshes are taken to be in metres and are named by their
+category. Objects without a twin or without a grasp count as 0 of 100. CPU seconds are those of the worker by stage, from
+run.json. Workers are forked like those of the command line if NumPy uses one thread (OPENBLAS_NUM_THREADS=1), and spawned
+otherwise.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ GRASPS_WANTED = 100
 
 
 def write_manifest(data: Path, out: Path, kind: str, only: set[str]) -> Path:
-    """Write a manifest of the data's meshes or photos, named by category."""
+    """Write a manifest of the meshes or photos of the data folder, named by category, and return its path."""
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{kind}.csv"
     with (data / "manifest.csv").open(newline="") as source, path.open("w", newline="") as target:
@@ -40,7 +41,7 @@ def write_manifest(data: Path, out: Path, kind: str, only: set[str]) -> Path:
 
 
 def label(file: Path, kind: str) -> str:
-    """Return the short name of an input: a mesh's folder, a photo's stem."""
+    """Return the short name of an input: the folder's name for a mesh, the file's stem for a photo."""
     return file.parent.name if kind == "mesh" else file.stem
 
 
@@ -48,7 +49,7 @@ HEADER = f"{'object':22s} {'status':9s} {'prop':>5s} {'sim':>4s} {'ver':>4s} {'u
 
 
 def print_table(results: list, kind: str) -> list[dict]:
-    """Print a row for each result; returns the figures of the rows."""
+    """Print a row for each result, and return the figures of the rows."""
     print(f"{HEADER}  failures or reason")
     figures = []
     for result in sorted(results, key=lambda r: r.item.file):
@@ -94,13 +95,13 @@ def print_summary(figures: list[dict]) -> None:
 
 
 def print_seconds(name: str, seconds: list[float]) -> None:
-    """Print how CPU seconds are spread."""
+    """Print the median, 90th percentile and maximum of CPU seconds."""
     ninetieth = np.percentile(seconds, 90)
     print(f"  {name:14s} median {np.median(seconds):6.2f}  p90 {ninetieth:6.2f}  max {max(seconds):6.2f} CPU-s")
 
 
 def main() -> None:
-    """Build and print."""
+    """Build the twins and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
     parser.add_argument("out", type=Path)

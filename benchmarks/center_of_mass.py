@@ -1,11 +1,11 @@
-"""Compare centres of mass with those of templates, whose parts and their matter are known by construction.
+"""Compare estimated centres of mass with those of templates, whose parts and materials are known by construction.
 
     python benchmarks/center_of_mass.py [--seeds N] [--held-out]
 
-Each thing is built of the looks that its template draws, so that its handle may be of another matter than the prior says. Its
-mesh and its name are all that is given. ``uniform`` is the solid filled evenly, ``by parts`` what the materials of the prior
-give where the form shows the parts; both as the distance (mm) to the true centre. Halves of the categories are those of
-``points.py``; nothing was set by either.
+Each object is built with the appearance that its template draws, so its handle may have another material than the prior assumes.
+The estimate is given only the mesh and the name. ``uniform`` assumes a solid of constant density; ``by parts`` uses the materials
+of the prior where the shape shows the parts. Both columns are the distance (mm) to the true centre of mass. The categories are
+split into the halves of ``points.py``; no parameter was set with either half.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from manitwin.pipeline.mass_by_parts import mass_by_parts
 
 
 def main() -> None:
-    """Print a line a category, then the medians and the largest."""
+    """Print a line for each object, then the medians and the largest distances."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--held-out", action="store_true")
@@ -55,7 +55,7 @@ def main() -> None:
 
 
 def distances_mm(category: str, seed: int) -> tuple[float, float] | None:
-    """Return how far both centres are from the true one; None where no parts are told."""
+    """Return the distances (mm) of both estimates to the true centre, or None where no parts can be recognised."""
     templates, prior = load_templates(), lookup(category)
     assert prior is not None
     made = make(templates[category], read_text(category, templates), np.random.default_rng(seed))

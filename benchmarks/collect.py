@@ -1,10 +1,10 @@
-"""Time a catalogue of many rows: adding a list of addresses, adding it again, its status, and a plan.
+"""Time a catalogue with many rows: adding a list of addresses, adding it again, its status, and a plan.
 
     python benchmarks/collect.py [--rows N]
 
-Addresses, categories (of the priors), sources, licences and sizes are drawn at random. Columns are wall and CPU seconds; the
-status is the best of five with a fresh connection each, the file in the machine's cache. The plan takes the addresses for
-files. Exit status 1 where the status takes more than 0.2 s or the plan more than 10 s.
+Addresses, categories (those of the priors), sources, licences and sizes are drawn at random. The columns are wall and CPU
+seconds. The status is the best of five runs, each with a new connection and the file in the operating system's cache. The plan
+treats the addresses as files. The exit status is 1 if the status takes more than 0.2 s or the plan more than 10 s.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LICENCES = ("CC0-1.0", "CC-BY-4.0", "CC-BY-SA-4.0", "CC-BY-NC-4.0", "MIT", "Apac
 
 
 def write_list(path: Path, count: int) -> None:
-    """Write a list of addresses."""
+    """Write a list of ``count`` random addresses as JSON Lines."""
     draw = random.Random(0)
     names = [*load_priors(), "thing nobody knows"]
     with path.open("w") as stream:
@@ -47,7 +47,7 @@ def write_list(path: Path, count: int) -> None:
 
 
 def timed(what: str, do: Callable[[], object], repeats: int = 1) -> float:
-    """Print and return the wall seconds of the best of some repeats."""
+    """Print the wall and CPU seconds of the best of some repetitions, and return the wall seconds."""
     best = (float("inf"), float("inf"))
     for _ in range(repeats):
         wall, cpu = time.perf_counter(), time.process_time()
@@ -58,7 +58,7 @@ def timed(what: str, do: Callable[[], object], repeats: int = 1) -> float:
 
 
 def main() -> None:
-    """Make the catalogue and time what is asked of it."""
+    """Make the catalogue and time the operations."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rows", type=int, default=100_000)
     count = parser.parse_args().rows

@@ -1,16 +1,17 @@
-"""Score the colours that a surface is said to have, on things of known colours with the light of a capture baked into them.
+"""Score the colour names given to surfaces, on objects of known colours that carry baked-in lighting of a capture.
 
     python benchmarks/colors.py [--seeds N] [--every K] [--held-out] [--flat]
 
-Scans and photo textures hold what a camera saw, not the matter's own colour. Each thing is a template whose text states its
-colour. What a camera sees of its surface is Lambert's law under one to four lights with shadows, even surroundings dimmed by
-what stands around a place, an exposure and a white balance that are a little off, and highlights on what is glossy
-(Blinn-Phong); ``--flat`` leaves all of that out. Places that can hardly be seen from outside do not count.
+Scans and photo textures hold what a camera recorded, not the albedo of the material. Each object is a template whose text states
+its colour. The recorded surface colour is simulated by Lambert's law under one to four lights with shadows, ambient light reduced
+by occlusion, a small error of exposure and white balance, and Blinn-Phong highlights on glossy materials; ``--flat`` leaves all
+of this out. Surface points that can hardly be seen from outside do not count.
 
-``first``: the first name is of a colour that has a quarter of the surface. ``no false``: no name is of a colour that the thing
-has not. ``all``: each colour with a third of the surface is named. What people call either way is right either way (``SAID``).
-Things mostly of bare metal are left out: they look like their surroundings. Halves of the categories are those of
-``points.py``; the held-out half has seeds, and so lights, of its own, and nothing is set by it.
+``first``: the first name is that of a colour with at least a quarter of the surface. ``no false``: no name is that of a colour
+that the object does not have. ``all``: each colour with at least a third of the surface is named. Colours that people call by
+several names accept each of these names (``SAID``). Objects mostly of bare metal are left out, because they reflect their
+surroundings. The categories are split into the halves of ``points.py``. The held-out half has its own seeds and therefore its own
+lights; no parameter is set with it.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from manitwin.models.generators.templates.text import read_text
 
 SAMPLES = 3000
 AROUND = 24
-"""Rays by which a place's share of the open sky is told."""
+"""Number of rays by which the visible share of the sky is estimated at a surface point."""
 WORDS = (
     "white",
     "black",
@@ -68,11 +69,11 @@ SAID = {
     "bronze": {"tan", "brown", "beige"},
     "copper": {"tan", "brown", "orange", "dark orange"},
 }
-"""What each colour may be called; any other one by its own name, or that with 'dark' or 'light'."""
+"""Accepted names of each colour. Any other colour accepts its own name, alone or after 'dark' or 'light'."""
 
 
 def main() -> None:
-    """Print the shares of right names, and what is wrong."""
+    """Print the shares of correct names, and the wrong ones."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--every", type=int, default=1, help="every Kth category")
@@ -101,7 +102,10 @@ def main() -> None:
 
 
 def score(category: str, word: str, rng: np.random.Generator, *, flat: bool) -> tuple[str, set[str]] | None:
-    """Return what was said, and which of the three questions are right; None where a template cannot be made of that colour."""
+    """Return the names found and which of the three questions are answered correctly.
+
+    Returns None where the template cannot be made in that colour.
+    """
     templates = load_templates()
     try:
         made = make(templates[category], read_text(f"a {word} {category}", templates), rng)
@@ -114,7 +118,7 @@ def score(category: str, word: str, rng: np.random.Generator, *, flat: bool) -> 
     gloss = 1 - np.array([look.roughness for look in looks])
     metal = np.array([look.metallic for look in looks]) > 0.5
     if metal.mean() > 0.5:
-        return None  # the colour of a mirror is that of its surroundings
+        return None  # a mirror shows the colour of its surroundings
     seen = own if flat else captured(mesh, points, normals, own, gloss, rng)
     outside = seen_from_outside(mesh, points, normals)
     names = named_colors(lab_from_srgb(np.clip(linear_to_srgb(seen), 0, 1))[outside], bool(metal.any()))
@@ -126,7 +130,7 @@ def score(category: str, word: str, rng: np.random.Generator, *, flat: bool) -> 
 
 
 def questions(said: list[str], truths: dict[str, float], is_right: Callable[[str, str], bool]) -> set[str]:
-    """Return which of the three questions are answered rightly; ``is_right(said, truth)`` compares two words."""
+    """Return which of the three questions are answered correctly; ``is_right(said, truth)`` compares two colour words."""
     outcome = set()
     if any(is_right(said[0], truth) for truth, share in truths.items() if share >= 0.25):
         outcome.add("first")
@@ -138,7 +142,7 @@ def questions(said: list[str], truths: dict[str, float], is_right: Callable[[str
 
 
 def true_shares(made: Made, mesh: trimesh.Trimesh) -> dict[str, float]:
-    """Return the share of the surface of each colour, by the nearest word."""
+    """Return the share of the surface for each colour word, by the nearest word to each part's colour."""
     shares: dict[str, float] = {}
     for number, part in enumerate(made.mesh.names):
         name = nearest_word(made.looks[part].rgb)
@@ -147,14 +151,14 @@ def true_shares(made: Made, mesh: trimesh.Trimesh) -> dict[str, float]:
 
 
 def nearest_word(rgb: tuple[float, float, float]) -> str:
-    """Return the colour word whose own colour is nearest in CIELAB."""
+    """Return the colour word whose colour is nearest in CIELAB to an sRGB colour."""
     own = {name: [int(code[i : i + 2], 16) / 255 for i in (0, 2, 4)] for name, code in COLORS.items()}
     lab = lab_from_srgb(np.array(list(own.values())))
     return list(own)[int(np.linalg.norm(lab - lab_from_srgb(np.array(rgb)), axis=1).argmin())]
 
 
 def is_called(said: str, truth: str) -> bool:
-    """Tell whether people call a colour of that word so."""
+    """Tell whether ``said`` is an accepted name of the colour ``truth``."""
     return said.removeprefix("dark ").removeprefix("light ") == truth or said in SAID.get(truth, {truth})
 
 
@@ -166,7 +170,7 @@ def captured(
     gloss: np.ndarray,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Return the linear colours ``(N, 3)`` in 0..1 that a camera sees of a surface whose own are ``own (N, 3)``."""
+    """Return the linear colours ``(N, 3)`` in 0..1 that a camera records of a surface of albedo ``own (N, 3)``."""
     caster = RayCaster(mesh)
     start = points + 1e-4 * mesh.scale * normals
     directions = rng.normal(size=(AROUND, 3))
@@ -195,7 +199,7 @@ def captured(
 
 
 def is_free(caster: RayCaster, start: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Return 1.0 where nothing stands between a place and what is far away in a direction, else 0.0."""
+    """Return 1.0 for each point from which a distant light in the given direction is unobstructed, else 0.0."""
     distance, _ = caster.first_hits(start, np.broadcast_to(direction, start.shape))
     return np.isinf(distance).astype(float)
 

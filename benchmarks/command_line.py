@@ -1,8 +1,8 @@
-"""How long the command line takes to answer: alone, for help, and for what is wrong. CPU seconds and wall seconds.
+"""Measure CPU and wall seconds of the command line without arguments, for help, and for wrong arguments.
 
     python benchmarks/command_line.py [--cold]
 
-``--cold``: nothing is compiled yet, as at the first command after an installation.
+``--cold`` measures without compiled bytecode, as for the first command after an installation.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ WRONG_VALUES = (
 
 
 def measured(words: list[str], environment: dict[str, str]) -> tuple[float, float, int]:
-    """Return CPU seconds, wall seconds and exit status of one command."""
+    """Return the CPU seconds, wall seconds and exit status of one command."""
     before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     done = subprocess.run([sys.executable, "-m", "manitwin", *words], capture_output=True, env=environment)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -43,7 +43,7 @@ def measured(words: list[str], environment: dict[str, str]) -> tuple[float, floa
 
 
 def main() -> None:
-    """Print a line for each command, the slowest last."""
+    """Print a line for each command, and the slowest one last."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cold", action="store_true")
     cold = parser.parse_args().cold

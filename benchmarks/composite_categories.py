@@ -1,6 +1,7 @@
-"""The categories of composites: those of which the shipped networks and beliefs were made, whatever templates are made since.
+"""Categories of composites, fixed to those with which the shipped networks and confidence models were trained.
 
-Pictures are drawn by a seed and a place in this list: another list would make other pictures, and other figures.
+Pictures are drawn from a seed and a position in this list. A different list would give different pictures and different figures,
+so templates added later are not included.
 """
 
 from __future__ import annotations
@@ -23,4 +24,4 @@ whisk, wine glass, wok, wrench
     .strip()
     .split(", ")
 )
-"""Sorted by name; one of four is in no picture that a network was trained with (``composite_things.is_unseen``)."""
+"""Categories sorted by name. Every fourth one is in no training picture (``composite_things.is_unseen``)."""

@@ -1,4 +1,4 @@
-"""The grounds of composites: a plane and sometimes a wall, with textures in perspective, clutter and light that falls off."""
+"""Backgrounds of composites: a ground plane and sometimes a wall, with textures in perspective, clutter and light falloff."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ GROUNDS: dict[Part, tuple[str, ...]] = {
 
 
 def draw_ground(rng: np.random.Generator, part: Part, thing: Thing, placement: np.ndarray) -> tuple[np.ndarray, str]:
-    """Return the empty scene (H, W, 3), linear light, and what it is called."""
+    """Return the empty scene ``(H, W, 3)`` in linear light and the name of its kind."""
     family = GROUNDS[part][int(rng.integers(len(GROUNDS[part])))]
     setting = family
     scale = placement[0, 0]
@@ -52,7 +52,7 @@ def draw_ground(rng: np.random.Generator, part: Part, thing: Thing, placement: n
         setting += ", same colour"
     picture = _textured(rng, family, place / size_m, colour[0])
     if not floor.all():
-        if family in ("plain", "paper") and rng.random() < 0.6:  # a sheet of paper that bends up: no line behind
+        if family in ("plain", "paper") and rng.random() < 0.6:  # paper bent upwards, no edge behind
             depth = np.clip((np.minimum(reach, 4 * reach_limit) / reach_limit - 0.6) / 1.5, 0, 1)[..., None]
             picture = picture * (1 - depth * rng.uniform(-0.15, 0.3))
         else:
@@ -67,7 +67,10 @@ def draw_ground(rng: np.random.Generator, part: Part, thing: Thing, placement: n
 
 
 def _base_colour(rng: np.random.Generator, thing: Thing) -> tuple[np.ndarray, bool]:
-    """Return a ground's colour, linear: mostly light and pale; in one of ten pictures that of the thing, nearly."""
+    """Return the linear colour of a ground: mostly light and pale; in one of ten pictures nearly that of the thing.
+
+    The flag says whether the ground has nearly the colour of the thing.
+    """
     if rng.random() < 0.1:
         mean = thing.rgb[thing.coverage > 0.5].mean(0)
         return np.clip(mean * np.exp(rng.normal(0, 0.12, 3)), 0.01, 0.95), True
@@ -78,7 +81,10 @@ def _base_colour(rng: np.random.Generator, thing: Thing) -> tuple[np.ndarray, bo
 
 
 def _textured(rng: np.random.Generator, family: str, place: np.ndarray, colour: np.ndarray) -> np.ndarray:
-    """Return a surface (H, W, 3), linear light, whose texture repeats over ``place`` (H, W, 2) in sizes of the thing."""
+    """Return a surface ``(H, W, 3)`` in linear light whose texture repeats over ``place (H, W, 2)``.
+
+    ``place`` is in units of the thing's size.
+    """
     if family == "plain":
         return np.broadcast_to(colour, (*place.shape[:2], 3)).copy()
     seed, repeat = int(rng.integers(1 << 30)), float(rng.uniform(0.15, 0.6))
@@ -91,7 +97,7 @@ def _textured(rng: np.random.Generator, family: str, place: np.ndarray, colour: 
     angle = rng.uniform(0, np.pi)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     at = (place @ turn * repeat * 512).astype(np.float32) % 512
-    # what is smaller than a pixel is blurred, or it would flicker
+    # Details smaller than a pixel are blurred, to avoid aliasing.
     step = float(np.median(np.abs(np.diff(place, axis=1)).max(-1))) * repeat * 512
     smooth = cv2.GaussianBlur(texture.astype(np.float32), (0, 0), max(0.3, 0.5 * step), borderType=cv2.BORDER_REFLECT)
     smooth = np.pad(smooth, ((0, 1), (0, 1), (0, 0)), mode="wrap")
@@ -99,7 +105,7 @@ def _textured(rng: np.random.Generator, family: str, place: np.ndarray, colour: 
 
 
 def _noise_of(rng: np.random.Generator, family: str) -> np.ndarray:
-    """Return the relief (512, 512) of a material as deviations from its mean light."""
+    """Return the pattern ``(512, 512)`` of a material as deviations from its mean brightness."""
     if family == "paper":
         return 0.012 * periodic_noise(rng, 512, wavelengths=(0.05, 0.05), slope=0.4)
     if family == "concrete":
@@ -130,7 +136,7 @@ def _noise_of(rng: np.random.Generator, family: str) -> np.ndarray:
 
 
 def _cluttered(rng: np.random.Generator, picture: np.ndarray, part: Part) -> np.ndarray:
-    """Put other things, far out of focus, behind."""
+    """Draw other objects, far out of focus, behind the thing."""
     layer = picture.copy()
     for _ in range(int(rng.integers(2, 5))):
         other = draw_thing(rng, None, part)
@@ -141,7 +147,7 @@ def _cluttered(rng: np.random.Generator, picture: np.ndarray, part: Part) -> np.
 
 
 def _falloff(rng: np.random.Generator) -> np.ndarray:
-    """Return the light (H, W, 1) of a lamp beside, and the vignette of a lens."""
+    """Return the light ``(H, W, 1)`` of a lamp at the side, with the vignette of a lens."""
     y, x = np.mgrid[-1 : 1 : HEIGHT_PX * 1j, -1 : 1 : WIDTH_PX * 1j]
     direction, strength = rng.uniform(0, 2 * np.pi), rng.uniform(0, 0.3)
     slope = 1 + strength * (np.cos(direction) * x + np.sin(direction) * y)

@@ -1,4 +1,4 @@
-"""The shadows of composites: a mesh projected along the light, from several points of a lamp of some extent."""
+"""Shadows of composites: a mesh projected along the light, from several points of an extended lamp."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from manitwin.geometry.poses import inverse, transform_points
 
 @dataclass(frozen=True)
 class Lamp:
-    """``towards (3,)`` from the light; ``extent`` of the lamp in its distance: 0.02 is hard; ``depth (3,)`` of its shadow,
-    which other lights tint."""
+    """A lamp that throws a shadow.
+
+    ``towards (3,)`` is the direction of its light, ``extent`` its size divided by its distance (0.02 gives a hard shadow), and
+    ``depth (3,)`` the darkness of its shadow per colour channel, tinted by other lights.
+    """
 
     towards: np.ndarray
     extent: float
@@ -23,7 +26,7 @@ class Lamp:
 
 
 def draw_lamp(rng: np.random.Generator) -> Lamp:
-    """Draw a lamp: in three of ten pictures one that is small and hard."""
+    """Draw a lamp at random; in three of ten pictures it is small and its shadow hard."""
     azimuth, elevation = rng.uniform(0, 2 * np.pi), np.deg2rad(rng.uniform(35, 80))
     towards = -np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
     hard = rng.random() < 0.3
@@ -34,7 +37,9 @@ def draw_lamp(rng: np.random.Generator) -> Lamp:
 
 
 def light_left(rng: np.random.Generator, thing: Thing, placement: np.ndarray, lamp: Lamp) -> np.ndarray:
-    """Return the light (H, W, 3) that a thing leaves on the ground: of a lamp, and of the sky around the contact."""
+    """Return the light ``(H, W, 3)`` that remains on the ground around a thing: that of the lamp, and that of the sky near the
+    contact.
+    """
     ground_z = thing.vertices[:, 2].min()
     lamps = 6
     shade = np.zeros((HEIGHT_PX, WIDTH_PX), np.float32)
@@ -65,6 +70,6 @@ def _fallen(thing: Thing, placement: np.ndarray, ground_z: float, towards: np.nd
     corners = np.clip(np.nan_to_num(pixels) / 2, -4000, 4000).astype(np.int32)[thing.faces[good]]
     edges = corners[:, [1, 2]] - corners[:, [0]]
     turned = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    for corner in corners[turned > 0]:  # of a closed solid, one side covers all
+    for corner in corners[turned > 0]:  # one side of a closed solid covers the whole shadow
         cv2.fillConvexPoly(mask, corner, 1)
     return cv2.resize(mask.astype(np.float32), (WIDTH_PX, HEIGHT_PX))

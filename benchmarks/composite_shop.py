@@ -1,4 +1,4 @@
-"""Composites on a ground of one exact digital colour, as pictures of shops are made: cut out by somebody, or overexposed."""
+"""Composites on a ground of one exact digital colour, like shop pictures that were cut out or overexposed."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from manitwin.formats.meshes.textures import linear_to_srgb
 WHITE = 255
 LIGHT_GROUNDS = (200, 254)
 SHADELESS = 0.99
-"""Of the light on the ground: more is none to an editor."""
+"""Share of the light on the ground above which an editor would see no shadow."""
 SIDES_PX = (180, 640)
 QUALITIES = (50, 97)
 
 
 def draw_exact_ground(rng: np.random.Generator) -> np.ndarray:
-    """Return a colour (3,) uint8: white in three of four pictures, else a light grey, or any colour."""
+    """Return a colour ``(3,)`` uint8: white in three of four pictures, else a light grey or any colour."""
     drawn = rng.random()
     if drawn < 0.75:
         return np.full(3, WHITE, np.uint8)
@@ -28,7 +28,7 @@ def draw_exact_ground(rng: np.random.Generator) -> np.ndarray:
 
 
 def shop_thing(rng: np.random.Generator, thing: Thing, ground: np.ndarray) -> Thing:
-    """Label one thing of three, and give one of five a part of the ``ground``'s colour (3,) uint8."""
+    """Print a label on one of three things, and give a part of one of five the colour ``ground (3,)`` uint8."""
     drawn = rng.random()
     if drawn < 1 / 3:
         return labelled(rng, thing)
@@ -36,7 +36,7 @@ def shop_thing(rng: np.random.Generator, thing: Thing, ground: np.ndarray) -> Th
 
 
 def shade_of_shop(rng: np.random.Generator, shade: np.ndarray) -> np.ndarray:
-    """Return the light (H, W, 3) left on the ground: all of it in half of the pictures, else that of a lighter ``shade``."""
+    """Return the light ``(H, W, 3)`` left on the ground: all of it in half of the pictures, else a lighter ``shade``."""
     if rng.random() < 0.5:
         return np.ones_like(shade)
     lighter = shade ** float(rng.uniform(0.2, 1.0))
@@ -46,10 +46,11 @@ def shade_of_shop(rng: np.random.Generator, shade: np.ndarray) -> np.ndarray:
 def shop_picture(
     rng: np.random.Generator, light: np.ndarray, coverage: np.ndarray, shade: np.ndarray, ground: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return a picture (H, W, 3) uint8 and its truth (H, W), of a size of its own and mostly compressed.
+    """Return a picture ``(H, W, 3)`` uint8 and its true mask ``(H, W)``, in a random size and mostly compressed.
 
-    ``light (H, W, 3)``, linear, of all that is seen, ``coverage (H, W)`` of things, ``shade`` as ``shade_of_shop``; where neither
-    is, the ground has its exact colour. In half of the pictures things are so bright that they lose their lightest tones.
+    ``light (H, W, 3)`` is the linear light of the scene, ``coverage (H, W)`` that of the things, and ``shade`` the result of
+    ``shade_of_shop``. Pixels with neither thing nor shadow have exactly the colour ``ground``. In half of the pictures the things
+    are overexposed, so that their lightest tones are clipped.
     """
     brighter = float(np.exp(rng.uniform(0, 0.7))) if rng.random() < 0.5 else 1.0
     shown = linear(ground) * shade

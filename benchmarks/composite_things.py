@@ -1,4 +1,4 @@
-"""The things of composites: templates rendered as a camera sees them, and where they lie in the picture."""
+"""Objects of composites: rendered templates and their positions in the picture."""
 
 from __future__ import annotations
 
@@ -22,14 +22,17 @@ Part = Literal["tuning", "held-out", "calibration", "training"]
 Kind = Literal["single", "cut", "several"]
 
 WIDTH_PX, HEIGHT_PX = 640, 512
-UNSEEN = 4  # one of so many categories is in no picture of the training part
-FLAT = 0.3  # height over footprint, below which a thing lies and is photographed from above
+UNSEEN = 4  # one of this many categories is in no training picture
+FLAT = 0.3  # height over footprint below which a thing lies and is photographed from above
 CLEAR = ("glass", "wine glass", "glass bottle", "jar", "vase", "bottle", "water bottle", "measuring cup")
 
 
 @dataclass(frozen=True)
 class Thing:
-    """A thing seen by ``camera``: ``rgb`` linear light times ``coverage``, vertices (N, 3) and faces, object frame."""
+    """A thing seen by ``camera``.
+
+    ``rgb`` is linear light multiplied by ``coverage``; the vertices ``(N, 3)`` and the faces are in the object frame.
+    """
 
     rgb: np.ndarray
     coverage: np.ndarray
@@ -41,12 +44,12 @@ class Thing:
 
 
 def is_unseen(category: str) -> bool:
-    """Return whether a category is kept out of the training part."""
+    """Tell whether a category is kept out of the training part."""
     return COMPOSITE_CATEGORIES.index(category) % UNSEEN == 0
 
 
 def draw_thing(rng: np.random.Generator, beside: Thing | None, part: Part) -> Thing:
-    """Render a template with drawn colours, from where one of ``beside`` is seen, if that is given."""
+    """Render a template in drawn colours, from a viewpoint like that of ``beside`` if it is given."""
     templates = load_templates()
     names = [name for name in COMPOSITE_CATEGORIES if part != "training" or not is_unseen(name)]
     while True:
@@ -82,8 +85,8 @@ def _elevation_deg(camera: Camera) -> float:
 
 
 def _printed(rng: np.random.Generator, coverage: np.ndarray) -> np.ndarray:
-    """Return factors (H, W, 3) of a print, a label or a pattern on half of the things, 1 elsewhere."""
-    factors = np.full((*coverage.shape, 3), 100, np.uint8)  # of a hundred
+    """Return colour factors ``(H, W, 3)`` of a print, a label or a pattern on half of the things, and 1 elsewhere."""
+    factors = np.full((*coverage.shape, 3), 100, np.uint8)  # in percent
     if rng.random() < 0.5:
         return np.ones(factors.shape, np.float32)
     ys, xs = np.nonzero(coverage > 0.5)
@@ -104,12 +107,12 @@ def _printed(rng: np.random.Generator, coverage: np.ndarray) -> np.ndarray:
 
 
 def _sided(rng: np.random.Generator) -> np.ndarray:
-    """Return light (W,) that comes more from one side."""
+    """Return a brightness ``(W,)`` that increases towards one side."""
     return np.linspace(1, float(rng.uniform(0.7, 1.4)), WIDTH_PX, dtype=np.float32)
 
 
 def place_of(rng: np.random.Generator, thing: Thing, kind: Kind, scale: float | None = None) -> np.ndarray:
-    """Return the map (2, 3) from the thing's own picture to the composite."""
+    """Return the affine map ``(2, 3)`` from the thing's own picture to the composite."""
     ys, xs = np.nonzero(thing.coverage > 0.5)
     low, high = np.array([xs.min(), ys.min()]), np.array([xs.max(), ys.max()]) + 1
     size = np.array([WIDTH_PX, HEIGHT_PX])
@@ -125,7 +128,7 @@ def place_of(rng: np.random.Generator, thing: Thing, kind: Kind, scale: float | 
 
 
 def overlaps(things: list[Thing], placements: list[np.ndarray], other: Thing, placement: np.ndarray) -> bool:
-    """Tell whether a thing would come within 12 pixels of those that are there."""
+    """Tell whether a thing would come within 12 pixels of the things already placed."""
     size = (WIDTH_PX, HEIGHT_PX)
     mask = cv2.dilate(cv2.warpAffine(other.coverage, placement, size), np.ones((25, 25))) > 0.1
     return any(
@@ -135,17 +138,17 @@ def overlaps(things: list[Thing], placements: list[np.ndarray], other: Thing, pl
 
 
 def premultiplied(rgb: np.ndarray, coverage: np.ndarray) -> np.ndarray:
-    """Return the linear light (H, W, 3) that what covers each pixel sends, times its ``coverage`` (H, W).
+    """Return the linear light ``(H, W, 3)`` of the thing in each pixel, multiplied by its ``coverage (H, W)``.
 
-    ``rgb (H, W, 3) uint8`` is sRGB averaged with a black background: read as linear light as it is, it would give all things a
-    dark fringe.
+    ``rgb (H, W, 3) uint8`` is sRGB averaged with a black background. Converting it to linear light directly would give every
+    thing a dark fringe.
     """
     share = np.maximum(coverage, 1 / 255)[..., None]
     return linear(np.rint(np.minimum(rgb / share, 255)).astype(np.uint8)) * coverage[..., None]
 
 
 def linear(rgb: np.ndarray) -> np.ndarray:
-    """Return linear light of sRGB (..., 3) uint8."""
+    """Return sRGB values ``(..., 3)`` uint8 as linear light."""
     return np.asarray(_LINEAR[rgb])
 
 

@@ -1,4 +1,4 @@
-"""Variants of composites: things with a label or a part of the ground's colour, and small, strongly compressed pictures."""
+"""Variants of composites: a label on the thing, a part in the colour of the ground, and small, strongly compressed pictures."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ Variant = Literal["plain", "labelled", "matched", "small", "shop", "black"]
 VARIANTS: tuple[Variant, ...] = ("plain", "labelled", "matched", "small", "shop", "black")
 
 SMALL_PX = 256
-SMALL_QUALITY = 65  # of JPEG; colours have half the resolution (4:2:0)
+SMALL_QUALITY = 65  # JPEG quality; the colours have half the resolution (4:2:0)
 LABEL_SHARE = (0.15, 0.55)  # of the thing's area
 LEAST_LABEL_PX = 12
 MATCHED_SHARE = (0.15, 1.0)  # of the thing's area
 
 
 def labelled(rng: np.random.Generator, thing: Thing) -> Thing:
-    """Return a thing with a label printed on it: a patch of another colour within its outline, with bars as of letters.
+    """Return a thing with a label printed on it: a patch of another colour inside its silhouette, with bars like letters.
 
-    The light on the thing stays: the label's colours are multiplied by how bright the thing is there. A clear thing, and one
-    too thin for a label, is returned as it is.
+    The label keeps the shading of the thing: its colours are multiplied by the local brightness. A transparent thing, and one too
+    thin for a label, is returned unchanged.
     """
     inside = thing.coverage > 0.99
     depth = cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, 5)
@@ -52,9 +52,9 @@ def labelled(rng: np.random.Generator, thing: Thing) -> Thing:
 
 
 def matched(rng: np.random.Generator, thing: Thing, ground: np.ndarray) -> Thing:
-    """Return a thing a part of which, beyond a line across it, has nearly the colour ``ground (3,)`` (linear light) around it.
+    """Return a thing of which the part beyond a line across it has nearly the colour ``ground (3,)`` (linear light) around it.
 
-    A white cap on a white table: the light on the part stays. A clear thing is returned as it is.
+    The part keeps its shading, like a white cap on a white table. A transparent thing is returned unchanged.
     """
     rows, columns = np.nonzero(thing.coverage > 0.5)
     if thing.clear or not len(rows):
@@ -73,7 +73,7 @@ def matched(rng: np.random.Generator, thing: Thing, ground: np.ndarray) -> Thing
 
 
 def small(rgb: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a picture (H, W, 3) uint8 and its truth (H, W) at ``SMALL_PX``, compressed as ``SMALL_QUALITY``."""
+    """Return a picture ``(H, W, 3)`` uint8 and its true mask ``(H, W)`` at ``SMALL_PX``, compressed with ``SMALL_QUALITY``."""
     scale = SMALL_PX / max(rgb.shape[:2])
     reduced = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     encoded = cv2.imencode(".jpg", reduced[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, SMALL_QUALITY])[1]

@@ -1,9 +1,10 @@
-"""Composites whose mask is known exactly: things of templates on grounds of the project's own making.
+"""Composites with an exactly known mask: rendered templates on backgrounds that the project generates itself.
 
-A picture has a ground plane and sometimes a wall behind it, with the texture in perspective; the thing's own shadow on the ground
-(its mesh projected along the light, from several points of a lamp of some extent); light that falls off; the blur, noise
-and JPEG of a camera. Kinds: ``single`` (one whole thing: to be accepted), ``cut`` (the frame cuts it off) and ``several``
-(two or three things of like size): to be rejected. Same part and number: same picture.
+A picture has a textured ground plane in perspective and sometimes a wall behind it. The thing throws a shadow on the ground: its
+mesh is projected along the light from several points of an extended lamp. The light falls off, and lens blur, sensor noise and
+JPEG compression are applied. The kinds are ``single`` (one whole thing, to be accepted), ``cut`` (the frame cuts the thing off)
+and ``several`` (two or three things of similar size); the last two are to be rejected. The same part and number always give the
+same picture.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ VARIANT_SEED = 7
 
 @dataclass(frozen=True)
 class Composite:
-    """``rgb (H, W, 3) uint8``; ``truth (H, W) bool``: where the thing covers at least half of the pixel.
+    """A composite picture and its truth.
 
-    ``setting`` is the ground's family, with ``wall``, ``clutter``, ``same colour`` or ``clear`` where that is so.
+    ``rgb`` is ``(H, W, 3) uint8``. ``truth (H, W) bool`` is true where the thing covers at least half of the pixel. ``setting``
+    is the kind of ground, with ``wall``, ``clutter``, ``same colour`` or ``clear`` added where they apply.
     """
 
     rgb: np.ndarray
@@ -37,7 +39,7 @@ class Composite:
 
 
 def composite(part: Part, number: int, variant: Variant = "plain") -> Composite:
-    """Make a picture of one of the parts by its number, in a variant of it on request."""
+    """Make the picture of a part with the given number, in the given variant."""
     rng = np.random.default_rng([number, SEEDS[part]])
     drawn = rng.random()
     kind: Kind = "single" if drawn < 0.72 else "cut" if drawn < 0.86 else "several"
@@ -76,7 +78,7 @@ def composite(part: Part, number: int, variant: Variant = "plain") -> Composite:
     covered = np.zeros((HEIGHT_PX, WIDTH_PX), np.float32)
     truth = np.zeros((HEIGHT_PX, WIDTH_PX), bool)
     for thing, placement in zip(things, placements, strict=True):
-        smooth = 0.45 * max(0.0, 1 / placement[0, 0] - 1) + 1e-3  # what is smaller than a pixel would flicker
+        smooth = 0.45 * max(0.0, 1 / placement[0, 0] - 1) + 1e-3  # details smaller than a pixel would alias
         rgb, coverage = (
             cv2.warpAffine(cv2.GaussianBlur(x, (0, 0), smooth), placement, (WIDTH_PX, HEIGHT_PX))
             for x in (thing.rgb, thing.coverage)
@@ -97,7 +99,7 @@ def composite(part: Part, number: int, variant: Variant = "plain") -> Composite:
 def _over(
     rng: np.random.Generator, light: np.ndarray, rgb: np.ndarray, coverage: np.ndarray, *, clear: bool
 ) -> np.ndarray:
-    """Lay a thing over what is there; through a clear one the ground is seen, shifted, but at its rim."""
+    """Draw a thing over the picture; through a transparent one the ground is visible, displaced, except at its rim."""
     if not clear:
         return light * (1 - coverage[..., None]) + rgb
     shift = np.array([[1, 0, rng.uniform(-9, 9)], [0, 1, rng.uniform(-9, 9)]])
@@ -112,7 +114,7 @@ def _over(
 
 
 def _photographed(rng: np.random.Generator, light: np.ndarray) -> np.ndarray:
-    """Return what a camera makes of linear light: lens blur, noise of photons and reading, sRGB, JPEG."""
+    """Return the sRGB picture of a camera of linear light: lens blur, photon and read noise, and JPEG compression."""
     light = np.asarray(cv2.GaussianBlur(light.astype(np.float32), (0, 0), float(rng.uniform(0.35, 1.0))))
     light = light * np.exp(rng.normal(0, 0.04, 3)).astype(np.float32)
     gain = float(rng.uniform(0.2, 2.5)) * 1e-4

@@ -1,9 +1,10 @@
-"""Measure what the engine of a run costs by itself: stages that do nothing, in real worker processes, with a real ledger.
+"""Measure the overhead of the run engine: stages that do nothing, in real worker processes, with a real ledger.
 
     python benchmarks/engine.py [--items 10000] [--stages 10] [--jobs 2] [--curve CSV] [--ray]
 
-Prints wall and CPU milliseconds an item-stage (CPU of driver and workers together; input and assembly count as stages: they
-are jobs), and the driver's memory over the run, which ``--curve`` writes as items ended, resident megabytes.
+Prints wall and CPU milliseconds per item and stage, and the driver's memory during the run. The CPU time is that of the driver
+and the workers together. Input and assembly count as stages, because they are jobs too. ``--curve`` writes the memory as a table
+of finished items and resident megabytes.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ EVERY = 500
 
 
 def main() -> None:
-    """Run once and print."""
+    """Run once and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--items", type=int, default=10_000)
     parser.add_argument("--stages", type=int, default=10)
@@ -48,7 +49,7 @@ def main() -> None:
 def _run(root: Path, arguments: argparse.Namespace) -> None:
     plan: tuple[tuple[str, Resource], ...] = tuple((f"stage_{n}", "cpu") for n in range(arguments.stages))
     recipe = RehearsalRecipe(plan)
-    settings = RunConfig(cpu=arguments.jobs, index_every=0, keep_work=False)  # the tables' cost is that of the twins
+    settings = RunConfig(cpu=arguments.jobs, index_every=0, keep_work=False)  # tables are a cost of the twins
     setup = WorkerSetup(str(root), recipe, root / "cache", keep_work=False)
     ledger = Ledger(root / "ledger.sqlite")
     ledger.add_items(Item(file=None, text=f"item {n}") for n in range(arguments.items))
@@ -96,13 +97,13 @@ def _executor(setup: WorkerSetup, settings: RunConfig, ray: bool):  # type: igno
 
 
 def resident_mb() -> float:
-    """Return this process' resident memory now."""
+    """Return the current resident memory of this process in megabytes."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * resource.getpagesize() / 1e6
 
 
 def cpu_seconds() -> float:
-    """Return the CPU seconds of this process and of its children that have ended."""
+    """Return the CPU seconds of this process and of its child processes that have ended."""
     own, children = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime
 

@@ -1,11 +1,12 @@
-"""Print the figures of folders of episodes, one row each: how far attempts came, the worst object, errors, and cost.
+"""Print the figures of folders of episodes, one row each: outcomes of the attempts, the worst object, errors and cost.
 
     manitwin trajectories TWINS -n 625 --seed 11 -o calibration          fits nothing but which grasps are retired
     manitwin trajectories TWINS -n 1250 --seed 21 -o empty --no-retire
     manitwin trajectories TWINS -n 1250 --seed 31 -o five --others 5 --no-retire
     python benchmarks/episodes.py empty five
 
-An object without any executed episode counts among the attempted, and is named. CPU seconds are those of the workers' stages.
+An object without any executed episode counts among the attempted ones and is listed. CPU seconds are those of the stages in the
+workers.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Print how often the measures of ``manitwin evaluate generation`` find a twin more like its own picture than another's.
+"""Measure how often ``manitwin evaluate generation`` finds a twin more similar to its own picture than to another's.
 
     python benchmarks/evaluation.py TWINS [--seed 0] [--most 100]
 
-The truth is known: the picture is drawn of the twin itself, from a side that is none of the 30 views. So this is what the
-measures can tell at best; a twin that was generated of a photo is less like it. One other picture is drawn by chance for each
-twin, as the command does, and all others are counted besides.
+The truth is known, because each picture is rendered from the twin itself, from a direction that is none of the 30 views. The
+figures are therefore an upper limit: a twin generated from a photo is less similar to its photo. For each twin one other picture
+is drawn at random, as the command does, and all other pictures are counted in addition.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ PICTURE_PX = 320
 
 
 def picture_of(twin: Twin, rng: np.random.Generator) -> Source:
-    """Draw a twin from a side drawn by chance."""
+    """Render a twin from a random direction."""
     camera = framing_camera(
         np.concatenate([part.vertices for part in twin.visual]),
         azimuth_deg=float(rng.uniform(0, 360)),

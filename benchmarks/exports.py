@@ -1,11 +1,12 @@
-"""Load what was exported back into four programs, and print how far each is from the twin.
+"""Load exported assets in four programs, and print how far each differs from the twin.
 
     python benchmarks/exports.py TWINS [--write docs/agreement.md] [--only NAME ...]
 
-TWINS is a folder of accepted twins, or a data set. MJCF is loaded by MuJoCo, URDF by SAPIEN and PyBullet, SDF by PyBullet, USD by
-pxr. For each: mass, centre of mass (of the longest side), principal moments, size of the collision shapes, in percent of the
-twin's own; and in the three engines how high the centre of mass is (of the longest side) once the object has been set down in
-its first placement for two seconds. Into what holds something a ball is dropped, in MuJoCo and in PyBullet.
+TWINS is a folder of accepted twins, or a data set. MJCF is loaded by MuJoCo, URDF by SAPIEN and PyBullet, SDF by PyBullet, and
+USD by pxr. Compared are mass, centre of mass (relative to the longest side), principal moments and the size of the collision
+shapes, in percent of the twin's own values. In the three engines the height of the centre of mass (relative to the longest side)
+is compared too, after the object has rested in its first placement for two seconds. In MuJoCo and PyBullet a ball is dropped into
+each container.
 """
 
 from __future__ import annotations
@@ -47,9 +48,10 @@ PROGRAMS = ("MJCF in MuJoCo", "URDF in SAPIEN", "URDF in PyBullet", "SDF in PyBu
 
 @dataclass(frozen=True)
 class Body:
-    """What a program made of a file: ``points (N, 3)`` span the collision shapes; ``settle`` is None without physics.
+    """The object as a program has loaded it.
 
-    ``settle`` takes the object's pose on the plane and returns the pose after two seconds.
+    ``points (N, 3)`` span the collision shapes. ``settle`` takes the object's pose on the plane and returns the pose after two
+    seconds; it is None without physics.
     """
 
     mass_kg: float
@@ -61,7 +63,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far a program is from the twin, in percent."""
+    """Deviations of a program's object from the twin, in percent."""
 
     mass: float | None
     center_of_mass: float | None
@@ -71,7 +73,7 @@ class Deviation:
 
 
 def in_mujoco(path: Path) -> Body:
-    """Load an MJCF file, with a plane under it."""
+    """Load an MJCF file together with a ground plane."""
     spec = mujoco.MjSpec.from_file(str(path))
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 0.1])
     spec.option.timestep = 0.002
@@ -100,12 +102,12 @@ def in_mujoco(path: Path) -> Body:
 
 
 def in_sapien(path: Path) -> Body:
-    """Load a URDF file by SAPIEN's own loader."""
+    """Load a URDF file with SAPIEN's own loader."""
     scene = sapien.Scene()
     scene.set_timestep(STEP_S)
     scene.add_ground(0.0)
     loader = scene.create_urdf_loader()
-    _, (entity,) = loader.load_multiple(str(path))[:2]  # of one link, to SAPIEN: an actor, and no articulation
+    _, (entity,) = loader.load_multiple(str(path))[:2]  # SAPIEN loads one link as an actor, not as an articulation
     link = entity.find_component_by_type(sapien.physx.PhysxRigidDynamicComponent)
     points = []
     for shape in link.get_collision_shapes():
@@ -127,7 +129,7 @@ def in_sapien(path: Path) -> Body:
 
 
 def in_pybullet(path: Path) -> Body:
-    """Load a URDF or SDF file by PyBullet, with a plane under it."""
+    """Load a URDF or SDF file in PyBullet together with a ground plane."""
     client = pybullet.connect(pybullet.DIRECT)
     pybullet.setGravity(0, 0, -9.81, client)
     plane = pybullet.createMultiBody(
@@ -154,12 +156,15 @@ def in_pybullet(path: Path) -> Body:
         )
 
     assert plane != body
-    moments = None if path.suffix == ".sdf" else np.array(info[2])  # its reader of SDF makes them up from the hulls
+    moments = None if path.suffix == ".sdf" else np.array(info[2])  # PyBullet computes those of SDF from hulls
     return Body(float(info[0]), np.array(info[3]), moments, points, settle)
 
 
 def _extremes_in_pybullet(client: int, body: int, inertial: np.ndarray) -> np.ndarray:
-    """Return the lowest and highest corner ``(2, 3)`` by the distances to six walls: PyBullet shows no hulls."""
+    """Return the lowest and highest corner ``(2, 3)`` of a body from its distances to six walls.
+
+    PyBullet gives no access to the hulls.
+    """
     quaternion = quaternion_wxyz(inertial[:3, :3])
     pybullet.resetBasePositionAndOrientation(body, inertial[:3, 3], np.roll(quaternion, -1), client)
     corners = np.zeros((2, 3))
@@ -178,7 +183,7 @@ def _extremes_in_pybullet(client: int, body: int, inertial: np.ndarray) -> np.nd
 
 
 def in_usd(path: Path) -> Body:
-    """Open a stage and read what its physics schemas say."""
+    """Open a USD stage and read its physics schemas."""
     stage = Usd.Stage.Open(str(path))
     root = stage.GetDefaultPrim()
     mass = UsdPhysics.MassAPI(root)
@@ -204,7 +209,7 @@ LOADERS = {
 
 
 def deviation(twin: TwinContent, body: Body) -> Deviation:
-    """Compare what a program has with the twin."""
+    """Return the deviations of a program's body from the twin."""
     physical, longest = twin.physical, max(twin.physical.extents_m)
     center, moments = np.array(physical.center_of_mass_m), np.linalg.eigvalsh(np.array(physical.inertia_kg_m2))
     hulls = np.concatenate([vertices for vertices, _ in twin.hulls])
@@ -228,7 +233,7 @@ def deviation(twin: TwinContent, body: Body) -> Deviation:
 
 
 def ball_in_mujoco(path: Path, opening: Opening) -> bool:
-    """Drop a ball into the fixed vessel of an MJCF file."""
+    """Drop a ball into the fixed container of an MJCF file, and tell whether it stays inside."""
     spec = mujoco.MjSpec.from_file(str(path))
     (vessel,) = spec.worldbody.bodies
     for joint in list(vessel.joints):
@@ -236,7 +241,7 @@ def ball_in_mujoco(path: Path, opening: Opening) -> bool:
     turn = rotation_between(opening.axis, np.array([0.0, 0, 1]))
     vessel.quat = quaternion_wxyz(turn)
     for geom in vessel.geoms:
-        geom.solref = STIFF_SOLREF  # on MuJoCo's default contacts a falling ball sinks a centimetre into any floor
+        geom.solref = STIFF_SOLREF  # with MuJoCo's default contacts a falling ball penetrates a floor by a centimetre
     radius, start = _ball(opening, turn)
     ball = spec.worldbody.add_body(name="ball", pos=start)
     ball.add_freejoint()
@@ -249,7 +254,7 @@ def ball_in_mujoco(path: Path, opening: Opening) -> bool:
 
 
 def ball_in_pybullet(path: Path, opening: Opening) -> bool:
-    """Drop a ball into the fixed vessel of a URDF file."""
+    """Drop a ball into the fixed container of a URDF file, and tell whether it stays inside."""
     client = pybullet.connect(pybullet.DIRECT)
     pybullet.setGravity(0, 0, -9.81, client)
     turn = rotation_between(opening.axis, np.array([0.0, 0, 1]))

@@ -1,10 +1,10 @@
-"""Measure what a model's measures do to templates fitted to photos: truthful ones, wrong ones, and wrong ones corrected once.
+"""Measure how a model's dimensions affect templates fitted to photos: correct ones, wrong ones, and wrong ones corrected once.
 
     python benchmarks/filled_templates.py OUT [--categories mug,bottle,"frying pan"] [--seeds 1] [--elevation 30]
 
-No model is asked: a chat answers with the true measures of the rendered thing (``template_photos``), or with the end of each
-interval that is farther from the truth. The photo's true outline is given, so that only the shape is measured. ``usual`` is
-what is built without a model. OUT gets the pictures that are compared, and ``results.csv``.
+No model is asked. A simulated chat answers with the true dimensions of the rendered object (``template_photos``), or with the end
+of each interval that is farther from the truth. The true mask is given, so that only the shape is measured. ``usual`` is built
+without a model. OUT receives the compared pictures and ``results.csv``.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ ANSWERS = ("usual", "true", "wrong", "wrong, then true")
 
 
 class Eyes:
-    """A model that chooses the right template, fills in what it is given, and corrects it once where it has something to."""
+    """A simulated model that chooses the right template, fills in the given dimensions, and corrects them once if asked to."""
 
     name, model = "benchmark", "eyes"
 
@@ -66,7 +66,7 @@ class Eyes:
 
 @dataclass(frozen=True)
 class Result:
-    """One photo with one kind of answers: overlap with the outline and with the true solid, 0 to 1."""
+    """Results of one photo with one kind of answers: IoU with the mask and with the true solid, 0 to 1."""
 
     category: str
     seed: int
@@ -79,7 +79,7 @@ class Result:
 
 
 def built(photo: TemplatePhoto, category: str, seed: int, answers: str, out: Path) -> Result:
-    """Build a photo with one kind of answers and compare."""
+    """Build a photo with one kind of answers and compare the result with the truth."""
     measures = load_templates()[category].measures
     limits = {name: (each.low, each.high) for name, each in measures.items()}
     truth = {name: float(np.clip(photo.made.measures[name], *limits[name])) for name in measures}

@@ -1,9 +1,10 @@
-"""Print what the codecs of films cost, a row each: CPU and bytes a picture, likeness to what was drawn, CPU to read it again.
+"""Print the cost of the video codecs, one row each: CPU and bytes per picture, similarity to the original, and reading cost.
 
     manitwin trajectories TWINS -n 10 -o EPISODES
     python benchmarks/films.py EPISODES --size 256
 
-The pictures are those of one batch of kept episodes, drawn again and kept in memory; what to draw one costs is the first line.
+The pictures are those of one batch of kept episodes, rendered again and held in memory. The first line is the cost of rendering a
+picture.
 """
 
 from __future__ import annotations
@@ -28,11 +29,11 @@ from manitwin.episodes.video import EpisodesVideo
 from manitwin.robots.load import load_robot
 
 AT_RANDOM = 30
-"""So many pictures are read from a film that was opened for each."""
+"""Number of pictures that are read at random, each from a newly opened video."""
 
 
 def row(camera: str, codec: str, pictures: np.ndarray, place: Path) -> str:
-    """Write and read a film of pictures ``(N, H, W, 3) uint8``; returns its figures."""
+    """Write and read a video of pictures ``(N, H, W, 3) uint8``, and return its figures as a row."""
     count, height, width = pictures.shape[:3]
     begun = time.process_time()
     with EpisodesVideo(place, width_px=width, height_px=height, codec=codec) as video:  # type: ignore[arg-type]

@@ -1,13 +1,14 @@
-"""Score frames from geometry against those of templates, which are known by construction.
+"""Score frames found by geometry against those of templates, which are known by construction.
 
     python benchmarks/frames.py [--seeds N] [--every K] [--held-out] [--pictures FOLDER]
 
-A frame is asked for at the candidate nearest to the known place on its part (of 42 by farthest point sampling), by the known
-point's label, without anything else that the template knows. Categories are split in halves by the CRC-32 of their names, as in
-``points.py``; nothing is set by the ``--held-out`` half. A frame is right within the stated bounds, absent where geometry says
-that it is not clear, of another kind where the label may mean one (a "base" is a face), and wrong else.
- Holes are compared by their axes' lines: which end of a bore is its place is a convention; tips by their ends,
-which may be as broad as the frame says.
+A frame is asked for at the candidate nearest to the known point on its part (of 42 candidates by farthest point sampling), with
+the known point's label and no other knowledge of the template. The categories are split in halves by the CRC-32 of their names,
+as in ``points.py``; no parameter is set with the ``--held-out`` half. A frame is right within the stated limits, absent where the
+geometry is judged unclear, of another kind where the label may mean several kinds (a "base" is a face), and wrong otherwise.
+
+Holes are compared by the lines of their axes, because the choice of the end of a bore is a convention. Tips are compared by their
+ends, which may be as broad as the frame states.
 """
 
 from __future__ import annotations
@@ -40,11 +41,11 @@ BARS = {
     "tip": (0.005, 10.0),
     "button": (0.003, 10.0),
 }
-"""Of each kind how far (m) and by what angle (degrees) a frame may be off; an edge's angle is that of its line."""
+"""Largest position error (m) and angle error (degrees) of a right frame, by kind; the angle of an edge is that of its line."""
 
 
 def main() -> None:
-    """Print the score of each kind, and what went wrong."""
+    """Print the score of each kind, and the wrong frames."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--every", type=int, default=1, help="every Kth category")
@@ -84,7 +85,7 @@ def main() -> None:
 def score(
     made: Made, seed: int, kind: str | None
 ) -> tuple[list[tuple[str, str, str, tuple[float, float] | None]], float]:
-    """Return of each known point its kind, the verdict, words, and how far off the frame is; and the CPU seconds."""
+    """Return kind, verdict, text and error of the frame at each known point, and the CPU seconds."""
     solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
     points, normals, faces = sample_surface(solid, SAMPLES, np.random.default_rng(seed))
     chosen = farthest_point_sampling(points, CANDIDATES, 0)
@@ -103,7 +104,7 @@ def score(
 
 
 def candidate_of(made: Made, known: KnownPoint, points: np.ndarray, part: np.ndarray, chosen: np.ndarray) -> int:
-    """Return the candidate on a known point's part that is nearest to it; where none is, the nearest sample of the part."""
+    """Return the nearest candidate on a known point's part, or else the nearest surface sample of the part."""
     mine = np.flatnonzero(part == made.mesh.names.index(known.part))
     own = np.intersect1d(mine, chosen)
     pool = own if len(own) else (mine if len(mine) else chosen)
@@ -113,7 +114,7 @@ def candidate_of(made: Made, known: KnownPoint, points: np.ndarray, part: np.nda
 def judged(
     made: Made, known: KnownPoint, center: np.ndarray, found: object
 ) -> tuple[str, str, tuple[float, float] | None]:
-    """Return the verdict on a frame, in words, and how far (m, degrees) it is off."""
+    """Return the verdict on a frame, a text, and its error (m, degrees)."""
     name = f"{known.label} [{known.part}]"
     if not isinstance(found, FeatureFrame):
         return "absent", f"{name}: {getattr(found, 'reason', '')}", None
@@ -130,7 +131,7 @@ def judged(
         offset = offset - (offset @ rotation[:, 2]) * rotation[:, 2]
     if known.kind == "edge":
         offset = offset - (offset @ rotation[:, 0]) * rotation[:, 0]
-    if known.kind == "tip":  # across, a place of the end is as good as its middle
+    if known.kind == "tip":  # any point across the end is as good as its middle
         along = float(offset @ rotation[:, 2])
         across = float(np.linalg.norm(offset - along * rotation[:, 2]))
         offset = np.array([along, max(0.0, across - max(truth.size_m, found.size_m)), 0.0])

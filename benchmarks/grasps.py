@@ -1,9 +1,9 @@
-"""Measure grasps over real meshes: what is proposed, what holds, why the rest fails, and what it costs.
+"""Measure grasps on real meshes: proposals, verified grasps, causes of failure, and cost.
 
     python benchmarks/grasps.py MANIFEST.csv [NAME...] [--work FOLDER] [--seed N]
 
-The manifest names meshes as that of the shared test data does (columns file, kind, category; units are metres). Every
-mesh goes through the pipeline's own stages up to verification; with ``--work`` earlier results are taken up again.
+The manifest lists meshes like that of the shared test data (columns file, kind, category; units are metres). Every mesh passes
+the stages of the pipeline up to verification. With ``--work`` the results of earlier runs are reused.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FILTERS = ("raw", "after_pad", "after_collision", "after_association", "after_di
 
 
 def main() -> None:
-    """Run the chosen meshes and print one line each, then the totals."""
+    """Build the chosen meshes and print one line each, then the totals."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("manifest", type=Path)
     parser.add_argument("names", nargs="*")
@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def measure(name: str, item: Item, work: Path, seed: int) -> tuple[int, int, float]:
-    """Take one mesh to its verified grasps; a rejected one counts as none of as many as should have been simulated."""
+    """Build one mesh up to its verified grasps; a rejected one counts as none verified of the full number of trials."""
     config = BuildConfig(seed=seed)
     draft = Draft(twin_id(item), item, seed)
     costs: dict[str, StageCost] = {}

@@ -1,10 +1,10 @@
-"""Print how handovers do with the twins of a data set: attempts, executed, kept, and of their negative controls.
+"""Print the results of handovers with the twins of a data set: attempted, executed, kept, and those of negative controls.
 
     python benchmarks/handover.py DATASET --seeds 10 --controls 5
 
-One row a twin; what no two of its grasps hand over takes no part. A negative control is the same episode with a second arm
-that goes 15 cm beside the object (beside; ``replan_failed`` where it has no way there), or does not close its hand (open): none
-may be kept. CPU seconds are those of an attempt, setting and planning included.
+Prints one row per twin. Twins without two grasps that allow a handover are left out. A negative control is the same episode with
+an error of the second arm: it reaches 15 cm beside the object (beside; ``replan_failed`` where no such motion exists), or it does
+not close its hand (open). None may be kept. CPU seconds are those of an attempt, including scene setup and planning.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ BESIDE_M = 0.15
 
 
 class Deceived(TwoArmPlanner):
-    """A planner whose second arm is told that the object is 15 cm beside where it is, once that is in the first hand."""
+    """A planner whose second arm is given a position 15 cm beside the object once the first hand holds it."""
 
     def plan_take(
         self,
@@ -48,7 +48,7 @@ class Deceived(TwoArmPlanner):
         put_down: PutDown,
         first: Sequence[Grasp] = (),
     ) -> Take | None:
-        """Plan for the wrong place where a plan is made anew; None where there is no way to any: that is no control."""
+        """Plan for the wrong position when a plan is made anew; None where no plan exists at any such position."""
         for angle in np.arange(0, 2 * np.pi, np.pi / 4) if first else ():
             way = BESIDE_M * np.array([np.cos(angle), np.sin(angle), 0.0])
             beside = transform(translation=way) @ object_to_world
@@ -64,12 +64,12 @@ class Bench(TwinBench):
     """Handovers of the twins of one data set."""
 
     def __init__(self, dataset: str, robot: str):
-        """Read the pool."""
+        """Read the pool of twins."""
         super().__init__(dataset, robot)
         self.planners = {"": TwoArmPlanner(self.robot), "beside": Deceived(self.robot)}
 
     def attempt(self, target: PoolTwin, seed: int, wrong: str = "") -> tuple[EpisodeFacts, float]:
-        """Return what became of an episode, or of its negative control of a kind, and its CPU seconds."""
+        """Return the facts of an episode, or of its negative control of the kind ``wrong``, and its CPU seconds."""
         began, rng, skill = time.process_time(), np.random.default_rng(seed), load_skill("handover")
         area = self.robot.workspace
         setting = table_setting(skill, target, self.pool, self.placeable, 0, area, rng, self.begins)

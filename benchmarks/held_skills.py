@@ -1,14 +1,14 @@
-"""Print how skills do with the twins of a data set: attempts, executed, kept, and of their negative controls.
+"""Print the results of skills with the twins of a data set: attempted, executed, kept, and those of negative controls.
 
     python benchmarks/held_skills.py DATASET --skills hang,press,strike --seeds 40 --controls 10
     python benchmarks/held_skills.py DATASET --skills all --attempts 42 --first 81000 --controls 0
     python benchmarks/held_skills.py DATASET --skills all --seeds 0 --controls 40
 
-One row a twin that can be used so, its partners drawn; with ``--attempts`` one row a skill, over its twins in turn. A negative
-control is the same episode, judged against what was asked for, gone about wrongly (``wrong_goals.CONTROLS``): of each kind so
-many are judged with a skill, over its twins in turn, or as many as four times as many attempts give; none may be kept. ``--mass``
-takes twins as so heavy, to see up to what weight a hand does it, whatever their grasps were tried with. CPU seconds are those
-of an attempt, setting and planning included.
+Prints one row for each twin that a skill can use, with partners drawn at random; with ``--attempts`` one row per skill, over its
+twins in turn. A negative control is the same episode with a deliberately wrong motion (``wrong_goals.CONTROLS``), judged against
+the original goal. Of each kind ``--controls`` are judged per skill, over its twins in turn, with at most four times as many
+attempts; none may be kept. ``--mass`` sets the mass of the twins, to find the mass up to which a hand succeeds, whatever mass
+their grasps were verified with. CPU seconds are those of an attempt, including scene setup and planning.
 """
 
 from __future__ import annotations
@@ -41,21 +41,21 @@ JUDGED = {
     "unplanned_contact",
     "disturbed",
     "goal_missed",
-}  # what is dropped on its way tells nothing of a judge
+}  # an object dropped on the way does not test the judge
 
 
 class Bench(TwinBench):
     """Episodes of one robot with the twins of one data set."""
 
     def __init__(self, dataset: str, robot: str, mass_kg: float | None = None):
-        """Read the pool; with ``mass_kg`` its twins weigh so much, spread as they are."""
+        """Read the pool of twins; with ``mass_kg`` they get this mass, with their own distribution of it."""
         super().__init__(dataset, robot)
         if mass_kg is not None:
             self.pool = Pool(self.pool.twins, partial(weighed, self.pool, mass_kg))
         self.planner = PickPlacePlanner(self.robot)
 
     def attempt(self, skill_name: str, target: PoolTwin, seed: int, wrong: str = "") -> tuple[str, float]:
-        """Return the outcome of an episode, or of its negative control of a kind, and its CPU seconds."""
+        """Return the outcome of an episode, or of its negative control of the kind ``wrong``, and its CPU seconds."""
         began, rng, skill = time.process_time(), np.random.default_rng(seed), load_skill(skill_name)
         area = self.robot.workspace
         setting = table_setting(skill, target, self.pool, self.placeable, 0, area, rng, self.begins)
@@ -82,7 +82,7 @@ class Bench(TwinBench):
         return facts.outcome, time.process_time() - began
 
     def twins_of(self, skill_name: str, categories: Sequence[str]) -> list[PoolTwin]:
-        """Return the twins that can be a skill's target, of some categories or of all."""
+        """Return the twins that can be a skill's target, of the given categories or of all."""
         skill, found = load_skill(skill_name), list[PoolTwin]()
         assert skill is not None
         for twin in self.pool.twins:
@@ -102,7 +102,7 @@ class Bench(TwinBench):
         return outcomes
 
     def in_turn(self, skill_name: str, twins: Sequence[PoolTwin], first: int, count: int) -> list[tuple[str, float]]:
-        """Return the outcomes and CPU seconds of so many attempts, each twin in turn, in an order that is drawn anew."""
+        """Return the outcomes and CPU seconds of ``count`` attempts, over the twins in turn, in a newly drawn order."""
         rng, order = np.random.default_rng(first), list[PoolTwin]()
         while len(order) < count:
             order += [twins[int(number)] for number in rng.permutation(len(twins))]
@@ -110,13 +110,13 @@ class Bench(TwinBench):
 
 
 def weighed(pool: Pool, mass_kg: float, twin_id: str) -> RigidBody:
-    """Return a twin's body as if it weighed ``mass_kg``."""
+    """Return a twin's rigid body with the mass ``mass_kg``."""
     body = pool.body(twin_id).body
     return replace(body, mass_kg=mass_kg, inertia_kg_m2=body.inertia_kg_m2 * (mass_kg / body.mass_kg))
 
 
 def row(name: str, ran: Sequence[tuple[str, float]]) -> str:
-    """Return a row: attempts, executed, kept, and what became of the others."""
+    """Return a row: attempted, executed, kept, and the outcomes of the others."""
     outcomes = Counter(outcome for outcome, _ in ran)
     executed = sum(count for outcome, count in outcomes.items() if outcome in EXECUTED)
     seconds = float(np.median([each for _, each in ran]))
@@ -126,7 +126,7 @@ def row(name: str, ran: Sequence[tuple[str, float]]) -> str:
 
 
 def main() -> None:
-    """Print a row for each twin and skill, and one of the controls of each skill."""
+    """Print a row for each twin and skill, and one for the controls of each skill."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("dataset")
     parser.add_argument("--skills", default="hang,press,strike")

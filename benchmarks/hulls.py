@@ -1,11 +1,10 @@
-"""Decompose real meshes into convex hulls and print what that costs and how well the hulls stand for the meshes.
+"""Decompose real meshes into convex hulls, and print the cost and how well the hulls approximate the meshes.
 
     python benchmarks/hulls.py DATA [--only NAME ...] [--samples N]
 
-DATA holds manifest.csv and meshes/. CPU seconds are those of finding the opening and decomposing. Errors are in mm,
-over mesh surface outside the hulls and hull surface outside the mesh; uncovered is the largest distance of mesh
-surface to the hulls. Cavity is the share of the open cavity that is kept. The ball is dropped into the opening in
-SAPIEN.
+DATA holds manifest.csv and meshes/. CPU seconds are those of finding the opening and decomposing. Errors are in mm, over mesh
+surface outside the hulls and hull surface outside the mesh; uncovered is the largest distance of the mesh surface to the hulls.
+Cavity is the share of the open cavity that is kept. The ball is dropped into the opening in SAPIEN.
 """
 
 from __future__ import annotations
@@ -28,11 +27,11 @@ from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.geometry.repair.cascade import repair
 from manitwin.physics.sapien.settle import ball_stays_inside
 
-Y_UP = ("bowl_evo", "plate_8in", "tomato_soup_can", "salt_shaker", "gelatin_box")  # glTF, and two OBJ of such sources
+Y_UP = ("bowl_evo", "plate_8in", "tomato_soup_can", "salt_shaker", "gelatin_box")  # glTF, and two OBJ files from glTF
 
 
 def load(path: Path, y_up: bool) -> trimesh.Trimesh:
-    """Load a mesh file as a watertight solid, Z-up."""
+    """Load a mesh file as a watertight solid with Z up."""
     loaded = trimesh.load(path)
     mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
     x, y, z = np.array(mesh.vertices, dtype=float).T
@@ -42,23 +41,23 @@ def load(path: Path, y_up: bool) -> trimesh.Trimesh:
 
 def manifold(mesh: trimesh.Trimesh) -> manifold3d.Manifold:
     """Return the mesh as a solid of manifold3d."""
-    vertices = np.array(mesh.vertices, dtype=np.float64, order="C")  # a copy: manifold3d refuses read-only arrays
+    vertices = np.array(mesh.vertices, dtype=np.float64, order="C")  # manifold3d refuses read-only arrays
     return manifold3d.Manifold(manifold3d.Mesh64(vertices, np.array(mesh.faces, dtype=np.uint64, order="C")))
 
 
 def intersection_over_union(mesh: trimesh.Trimesh, union: trimesh.Trimesh) -> float:
-    """Return the shared volume over the joint volume."""
+    """Return the volume of the intersection divided by that of the union."""
     shared = (manifold(mesh) ^ manifold(union)).volume()
     return float(shared / (mesh.volume + union.volume - shared))
 
 
 def loads_convex(hull: np.ndarray) -> bool:
-    """Tell whether a hull is convex to trimesh once written and read."""
+    """Tell whether trimesh finds a hull convex after it was written and read."""
     return bool(trimesh.load(io.BytesIO(hull_to_obj(hull)), file_type="obj", force="mesh").is_convex)
 
 
 def main() -> None:
-    """Print one row a mesh and a summary."""
+    """Print one row per mesh and a summary."""
     parser = argparse.ArgumentParser(description="Convex hulls of real meshes.")
     parser.add_argument("data", type=Path)
     parser.add_argument("--only", nargs="+", default=None)
