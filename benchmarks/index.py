@@ -3,11 +3,11 @@
     python benchmarks/index.py [--twins N] [--grasps-per-twin N] [--keep FOLDER]
     python benchmarks/index.py --rows DATASET
 
-The tables are written in parts as ``manitwin index`` leaves them; numbers and poses are random, words are drawn from lists,
-so that nothing compresses better than in a real set. Every filter is timed with a fresh connection (the list of parts, the
-views and the lock included; the files are in the machine's cache) and again on the same one. Columns are wall and CPU
-seconds, best of five; CPU counts all threads. ``--rows`` times the rows of the finished twins of a real data set instead, as
-their folders are and as if nothing but the mesh said its shape.
+The tables are written in parts as ``manitwin index`` leaves them. Numbers and poses are random and words are drawn from lists, so
+that the data compresses no better than a real set. Every filter is timed with a new connection (including the list of parts, the
+views and the lock; the files are in the operating system's cache) and again on the same connection. The columns are wall and CPU
+seconds, best of five; CPU counts all threads. ``--rows`` instead times the rows of the finished twins of a real data set, once
+with the shape stored in their folders and once with the shape measured from the mesh.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ REPEATS = 5
 def words(
     rng: np.random.Generator, choices: tuple[str, ...], count: int, shares: list[float] | None = None
 ) -> pa.Array:
-    """Return words drawn at random."""
+    """Return ``count`` words drawn at random from ``choices``."""
     return pa.array(choices).take(pa.array(rng.choice(len(choices), count, p=shares)))
 
 
 def filled(name: str, count: int, rng: np.random.Generator, **known: pa.Array) -> pa.Table:
-    """Return a table of the index: the known columns, and all others at random by their type."""
+    """Return a table of the index with the given columns, and random values in all others according to their type."""
     columns = []
     for field in TABLES[name]:
         if field.name in known:
@@ -81,14 +81,14 @@ def filled(name: str, count: int, rng: np.random.Generator, **known: pa.Array) -
 
 
 def descriptors(count: int, rng: np.random.Generator) -> pa.Array:
-    """Return descriptors that differ in four independent ways and lie as far apart as those of real objects (about 0.1)."""
+    """Return descriptors that vary in four independent directions, with distances like those of real objects (about 0.1)."""
     modes = np.random.default_rng(1).normal(size=(4, DESCRIPTOR_LENGTH)) / np.sqrt(DESCRIPTOR_LENGTH)
     values = (0.5 + 0.08 * rng.normal(size=(count, 4)) @ modes).astype(np.float32)
     return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), DESCRIPTOR_LENGTH)
 
 
 def made_rows(ids: np.ndarray, per_twin: int, rng: np.random.Generator) -> dict[str, pa.Table]:
-    """Return the tables of twins with so many grasps each."""
+    """Return the tables of the given twins with ``per_twin`` grasps each, by name."""
     count = len(ids)
     category = words(rng, CATEGORIES, count)
     color = words(rng, COLORS, count)
@@ -143,7 +143,7 @@ def write_index(root: DatasetRoot, twins: int, per_twin: int) -> None:
 
 
 def time_rows(data: Path) -> None:
-    """Print what the rows of finished twins cost, in turns with the shape that their folders say and a measured one."""
+    """Print the cost of the rows of finished twins, alternating between stored and measured shapes."""
     folders = sorted(path.parent for path in data.glob("twins/*/*/grasps.parquet"))
     spent = {"as it is": 0.0, "shape measured": 0.0}
     said = rows.read_shape
@@ -159,7 +159,7 @@ def time_rows(data: Path) -> None:
 
 
 def questions(twin_id: str) -> Iterator[tuple[str, Callable[[Index], int]]]:
-    """Yield filters by name; each returns how many rows it gave."""
+    """Yield filters by name; each returns the number of rows found."""
     yield (
         "twins: category = 'mug' and mass_kg < 0.4 and verified >= 20, all columns",
         lambda index: index.select("twins", "category = 'mug' and mass_kg < 0.4 and verified >= 20").num_rows,
@@ -199,7 +199,7 @@ def questions(twin_id: str) -> Iterator[tuple[str, Callable[[Index], int]]]:
 
 
 def timed(action: Callable[[], int]) -> tuple[float, float, int]:
-    """Return wall and CPU seconds of the fastest run, and the answer."""
+    """Return the wall and CPU seconds of the fastest run, and its result."""
     best = (np.inf, np.inf, 0)
     for _ in range(REPEATS):
         wall, cpu = time.perf_counter(), time.process_time()
@@ -209,7 +209,7 @@ def timed(action: Callable[[], int]) -> tuple[float, float, int]:
 
 
 def main() -> None:
-    """Print one row a filter, and what the index takes on disk."""
+    """Print one row per filter, and the size of the index on disk."""
     parser = argparse.ArgumentParser(description="Filters on a large index.")
     parser.add_argument("--twins", type=int, default=100_000)
     parser.add_argument("--grasps-per-twin", type=int, default=62)

@@ -1,9 +1,9 @@
-"""Where on a template's thing a label of the priors' forms is at its place: on parts, or in regions of the template's own frame.
+"""Regions of a template's object where a label of the priors belongs: parts, or regions of the template's own frame.
 
-A template knows its parts, that +Z is up, that what lies points its working end to +X, and that the front of what stands looks
-towards -Y. A place that is a part is judged by the part (``PARTS_OF``); a place that every thing has (its top, a side, the end
-away from the tip) by a region of the surface (``REGIONS``). Nothing here is measured as the rules measure it. A label that names
-neither on a thing is None: not judged.
+A template knows its parts. Its +Z is up, lying objects point their working end to +X, and the front of standing objects faces -Y.
+A label that names a part is judged by that part (``PARTS_OF``). A label that applies to every object (its top, a side, the end
+away from the tip) is judged by a region of the surface (``REGIONS``). Nothing is measured in the way in which the rules under
+test measure it. A label that names neither on an object gives None: it is not judged.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from manitwin.geometry.sampling import sample_surface
 from manitwin.models.generators.templates.made import Made
 
 NEAR_SHARE = 0.03
-"""Of the longest side: candidates are that far apart and rarely on a thin rim."""
+"""Accepted distance relative to the longest side. Candidates are about this far apart and rarely lie on a thin rim."""
 _SAMPLES = 12000
-_TURNED_AWAY = -0.3  # cosine: the other side of a thin wall is near, but another place
+_TURNED_AWAY = -0.3  # cosine: the other side of a thin wall is near, but a different place
 
 _BODIES = (
     "body", "tube", "bulb", "bowl", "cone", "roller", "barrel", "stem", "shaft", "cover", "legs", "neck", "blade",
@@ -58,14 +58,14 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
     "crown": ("crown", "button"), "brim": ("brim", "visor"), "knob": ("knob",), "spine": ("spine",),
     "weight": ("weights",), "dial": ("dial", "hands", "case"), "screen": ("screen", "case"), "strap": ("strap", "buckle"),
 }  # fmt: skip
-"""Which parts of templates a label speaks of."""
+"""The template parts that each label refers to."""
 
-_WORKING = ("tip", "lead", "bristles", "head", "jaws", "cap", "outlet", "blade")  # from which the far end is far
+_WORKING = ("tip", "lead", "bristles", "head", "jaws", "cap", "outlet", "blade")  # the far end is opposite these
 
 
 @dataclass(frozen=True)
 class Known:
-    """A made thing with samples of its surface: positions ``(N, 3)`` m, normals ``(N, 3)``, the part's number ``(N,)``."""
+    """A built object with samples of its surface: positions ``(N, 3)`` m, normals ``(N, 3)``, and part numbers ``(N,)``."""
 
     made: Made
     positions_m: np.ndarray
@@ -74,30 +74,30 @@ class Known:
 
     @classmethod
     def of(cls, made: Made) -> Known:
-        """Sample a thing."""
+        """Sample the surface of an object."""
         solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
         positions, normals, faces = sample_surface(solid, _SAMPLES, np.random.default_rng(0))
         return cls(made, positions, normals, made.mesh.part[faces])
 
     @cached_property
     def height(self) -> np.ndarray:
-        """The share of the height of each sample."""
+        """Height of each sample as a share of the total height ``(N,)``."""
         z = self.positions_m[:, 2]
         return (z - z.min()) / max(float(np.ptp(z)), 1e-9)
 
     @cached_property
     def longest_m(self) -> float:
-        """The longest side of the axis-aligned box."""
+        """Longest side of the axis-aligned box, metres."""
         return float(np.ptp(self.made.mesh.vertices, axis=0).max())
 
     def on(self, *names: str) -> np.ndarray:
-        """Tell which samples are on one of some parts."""
+        """Return which samples ``(N,)`` lie on one of the named parts."""
         return np.isin(self.part, [self.made.mesh.names.index(name) for name in names if name in self.made.mesh.names])
 
     def right(self, label: str, chosen: int, positions_m: np.ndarray, normals: np.ndarray) -> bool | None:
-        """Tell whether a label's candidate, ``chosen`` of ``(N, 3)``, is at its place; None: such a thing has no such place.
+        """Tell whether the candidate ``chosen`` of ``(N, 3)`` is where its label belongs; None if the object has no such place.
 
-        At its place is within 3 % of the longest side, or 6 % where no candidate is nearer.
+        The accepted distance is 3 % of the longest side, or 6 % where no candidate is nearer.
         """
         place = self.on(*PARTS_OF.get(label, ()))
         region = not place.any() and label in REGIONS
@@ -115,7 +115,7 @@ class Known:
 
 
 _FACES = frozenset({"inside", "cooking surface", "surface", "cup"})
-"""Places that a candidate on the other side of the wall does not stand for."""
+"""Labels for which a candidate on the other side of the wall does not count."""
 
 Region = Callable[[Known], np.ndarray]
 
@@ -130,7 +130,7 @@ def _upper_side(known: Known) -> np.ndarray:
 
 
 def _known_opening(known: Known) -> np.ndarray:
-    """The rim's plane of a known opening without a part of its own, else the upper side."""
+    """Return the plane of the rim of a known opening that is no part of its own, or else the upper side."""
     openings = [point for point in known.made.points if point.kind == "opening"]
     if not openings:
         return _upper_side(known)
@@ -176,7 +176,7 @@ def _far_end(known: Known) -> np.ndarray:
 
 
 def _nearer_spring(known: Known) -> np.ndarray:
-    """A clothespin's jaws: its legs on the side of the spring where they are short."""
+    """Return the jaws of a clothespin: the short legs on one side of the spring."""
     spring, x = known.on("spring"), known.positions_m[:, 0]
     if not spring.any():
         return spring
@@ -190,7 +190,7 @@ def _away_from_jaws(known: Known) -> np.ndarray:
 
 
 def _hole(known: Known) -> np.ndarray:
-    """The inside of a band: surface that looks at the middle."""
+    """Return the inside of a ring: the surface that faces the centre."""
     inward = known.positions_m.mean(0) - known.positions_m
     return known.on("band", "body", "strap") & (
         np.einsum("ij,ij->i", known.normals, inward) > 0.2 * np.linalg.norm(inward, axis=1)
@@ -203,7 +203,7 @@ def _rim_of_the_band(known: Known) -> np.ndarray:
 
 
 def _working_end(known: Known) -> np.ndarray:
-    """The end of a lying thing that points to +X, which is its working one."""
+    """Return the working end of a lying object, which points to +X."""
     x = known.positions_m[:, 0]
     along_x = np.ptp(x) >= np.ptp(known.positions_m, axis=0).max() - 1e-9
     return x > x.max() - 0.08 * np.ptp(x) if along_x else np.zeros(len(x), dtype=bool)
@@ -212,7 +212,7 @@ def _working_end(known: Known) -> np.ndarray:
 def _either_end(known: Known) -> np.ndarray:
     across = np.ptp(known.positions_m[:, :2], axis=0)
     if across.max() > np.ptp(known.positions_m[:, 2]) and across.max() < 1.01 * across.min():
-        return _outermost(known)  # what is round and lies has no ends but its edge
+        return _outermost(known)  # a round lying object has no ends except its edge
     along = known.positions_m[:, int(np.ptp(known.positions_m, axis=0).argmax())]
     return (along > along.max() - 0.1 * np.ptp(along)) | (along < along.min() + 0.1 * np.ptp(along))
 
@@ -234,4 +234,4 @@ REGIONS: dict[str, Region] = {
     "bowl tip": _working_end, "blade tip": _working_end, "blade tips": _working_end, "wiping face": _front,
     "back face": _back,
 }  # fmt: skip
-"""Where a label is that names no part of a thing, by what is true of such a place."""
+"""The region of each label that names no part, by a property that holds for such a place."""

@@ -1,17 +1,17 @@
-"""Score poses in noisy depth pictures: drawn scenes whose truth is known, wrong twins, and poses that nothing can tell apart.
+"""Score poses in noisy depth images: rendered scenes with known truth, wrong twins, and poses that cannot be distinguished.
 
     python benchmarks/locate.py DATASET SCENES... [--wrong N] [--most N] [--seed N] [-o FILE]
 
-Each object of each picture of the scenes (``manitwin layout DATASET --pictures --clutter dense``) of which at least 30 % and 200
-pixels are seen is a question; before some a board is put, so that
-30 to 60 % are seen. Depths get the noise of ``scenes/locate/depth_noise.py``; the mask is that of the scene. A pose
-is right where ADD(-S), ADD-S for shapes with a symmetry and ADD for others, is below a tenth of the diameter. ``--wrong``: as
-many other twins, drawn by chance, and the one most like it in size are looked for under the same mask, and are to be refused.
+Each object of each picture of the scenes (``manitwin layout DATASET --pictures --clutter dense``) that is visible to at least 30
+% and in at least 200 pixels is one query. In front of some objects a board is inserted so that 30 to 60 % remain visible. Depths
+get the noise of ``scenes/locate/depth_noise.py``; the mask is that of the scene. A pose is right if its ADD(-S) is below a tenth
+of the diameter (ADD-S for symmetric shapes, ADD for others). With ``--wrong`` that many other twins, drawn at random, and the one
+of the most similar size are searched for with the same mask; they are to be rejected.
 
-Ambiguous by construction are bodies of revolution and square blocks with one knob or handle that the picture does not show; the
-same bodies with the knob in sight are not.
+Ambiguous by construction are bodies of revolution and square blocks with one knob or handle that is hidden in the picture. The
+same bodies with a visible knob are not ambiguous.
 
-Thresholds are set on scenes of one seed, and figures told of another; both halves of the twins are told apart.
+Thresholds are set on scenes of one seed, and figures are reported for another seed, separately for both halves of the twins.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ LEAST_SHARE, LEAST_PX, RIGHT = 0.3, 200, 0.1
 BANDS = ((0.6, 1.01), (0.3, 0.6))
 BACKDROP_M = 1.4
 BOARD_FROM, BOARD_CHANCE = 0.8, 0.4
-"""Few things of a layout are mostly hidden: before so many of the others a board is put that hides 0.4 to 0.7 of them."""
+"""Visible share from which a board may be inserted, and its probability. The board leaves 30 to 60 % visible."""
 
 
 class Models:
-    """The twins of a data set, each prepared once; ``cpu_s`` is what that took of each."""
+    """The pose models of the twins of a data set, each prepared once; ``cpu_s`` holds the preparation time of each."""
 
     def __init__(self, dataset: Path):
         self._source, self._made, self.cpu_s = TwinSource(dataset), {}, []  # type: ignore[var-annotated]
@@ -55,7 +55,7 @@ class Models:
         self.extents = {each: np.sort(self._source.twin(each).physical.extents_m) for each in self.ids}
 
     def of(self, twin_id: str) -> PoseModel:
-        """Return a twin's model."""
+        """Return the pose model of a twin."""
         if twin_id not in self._made:
             before = time.process_time()
             self._made[twin_id] = PoseModel.of_twin(self._source.twin(twin_id))
@@ -63,7 +63,7 @@ class Models:
         return self._made[twin_id]  # type: ignore[no-any-return]
 
     def others(self, twin_id: str, count: int, rng: np.random.Generator) -> list[tuple[str, str]]:
-        """Return ``count`` other twins by chance and the one of the most like size."""
+        """Return ``count`` other twins drawn at random, and the one of the most similar size."""
         rest = [each for each in self.ids if each != twin_id]
         apart = [np.abs(np.log(self.extents[each] / self.extents[twin_id])).sum() for each in rest]
         like = rest[int(np.argmin(apart))]
@@ -72,7 +72,7 @@ class Models:
 
 
 def questions(scenes: Path, rng: np.random.Generator) -> Iterator[tuple[str, float, DepthView, np.ndarray, np.ndarray]]:
-    """Yield twin id, visible share, the noisy view, the mask and the true pose, in an order drawn by chance."""
+    """Yield twin id, visible share, the noisy view, the mask and the true pose of each query, in random order."""
     told = [
         (file, truth) for file in sorted(scenes.glob("scenes/*/*/scene.json")) for truth in [read_scene_truth(file)]
     ]
@@ -99,7 +99,7 @@ def questions(scenes: Path, rng: np.random.Generator) -> Iterator[tuple[str, flo
 def behind_board(
     depth_m: np.ndarray, mask: np.ndarray, left: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Put a board with a straight edge before a thing, 5 to 15 cm nearer, so that the share ``left`` of its pixels stays."""
+    """Insert a board with a straight edge 5 to 15 cm in front of an object, leaving the share ``left`` of its pixels."""
     rows, columns = np.indices(mask.shape)
     angle = rng.uniform(0, 2 * np.pi)
     along = np.cos(angle) * columns + np.sin(angle) * rows
@@ -109,7 +109,7 @@ def behind_board(
 
 
 def errors(model: PoseModel, found: np.ndarray, true: np.ndarray) -> tuple[float, float]:
-    """Return ADD and ADD-S (Hinterstoisser et al. 2012) as shares of the diameter."""
+    """Return ADD and ADD-S (Hinterstoisser et al. 2012) relative to the diameter."""
     points = model.points[::6]
     there, here = transform_points(true, points), transform_points(found, points)
     add = float(np.linalg.norm(there - here, axis=1).mean())
@@ -117,7 +117,7 @@ def errors(model: PoseModel, found: np.ndarray, true: np.ndarray) -> tuple[float
 
 
 def ask(models: Models, scenes: Path, most: int, wrong: int, seed: int) -> list[dict[str, Any]]:
-    """Look for each twin in the pictures, and for others in its place."""
+    """Search for each twin in the pictures, and for wrong twins in its place; return one row per query."""
     rng, rows = np.random.default_rng(seed), []
     for twin_id, share, view, mask, true in questions(scenes, rng):
         if len(rows) == most:
@@ -142,7 +142,7 @@ def ask(models: Models, scenes: Path, most: int, wrong: int, seed: int) -> list[
 
 
 def told(rows: list[dict[str, Any]], name: str) -> None:
-    """Print what a set of questions came to."""
+    """Print the figures of a set of queries."""
     for low, high in BANDS:
         some = [row for row in rows if low <= row["share"] < high]
         if not some:
@@ -168,7 +168,7 @@ def told(rows: list[dict[str, Any]], name: str) -> None:
 
 
 def knobbed(seed: int) -> tuple[str, trimesh.Trimesh, float]:
-    """Return a body that a turn about z leaves as it is but for one knob at azimuth 0, and the angle that its turns may have."""
+    """Return a name, a body that is symmetric about z except for one knob at azimuth 0, and the angle of its symmetry."""
     rng = np.random.default_rng(seed)
     radius, height = rng.uniform(0.03, 0.06), rng.uniform(0.06, 0.14)
     knob = trimesh.creation.box(rng.uniform([0.012, 0.01, 0.015], [0.02, 0.018, 0.04]))
@@ -183,14 +183,14 @@ def knobbed(seed: int) -> tuple[str, trimesh.Trimesh, float]:
 
 
 def ask_ambiguous(count: int) -> list[dict[str, Any]]:
-    """Look at knobbed bodies from where the knob is hidden, and from where it is seen."""
+    """Search for bodies with a knob from viewpoints where the knob is hidden, and from others where it is visible."""
     rows = []
     for seed in range(count):
         kind, mesh, step = knobbed(seed)
         model = PoseModel.of_mesh(f"{kind} {seed}", mesh)
         rng = np.random.default_rng(seed)
         for hidden in (True, False):
-            # a square block turned by a quarter hides its knob where the camera sees the two other sides
+            # A square block rotated by 90 degrees hides its knob if the camera sees only the two other sides.
             base = np.pi * 0.75 if step else np.pi
             azimuth = base + rng.uniform(-0.15, 0.15) if hidden else rng.uniform(0.4, 0.9)
             elevation, away = rng.uniform(0.15, 0.4), rng.uniform(0.6, 1.0)
@@ -223,7 +223,7 @@ def ask_ambiguous(count: int) -> list[dict[str, Any]]:
 
 
 def told_ambiguous(rows: list[dict[str, Any]]) -> None:
-    """Print how often ambiguity was said where it is, and where it is not."""
+    """Print how often ambiguity was reported where it exists, and where it does not."""
     for name, some in (
         ("hidden knob", [row for row in rows if row["counts"] and row["knob_px"] == 0]),
         ("knob in sight", [row for row in rows if row["counts"] and row["knob_px"] >= 40]),
@@ -238,7 +238,7 @@ def told_ambiguous(rows: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    """Score poses of a data set's twins in drawn scenes."""
+    """Score the poses of a data set's twins in rendered scenes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("dataset", type=Path)
     parser.add_argument("scenes", type=Path, nargs="*")

@@ -1,13 +1,14 @@
-"""Pick and place from estimated poses: a plan is made where things were located, and carried out where they truly are.
+"""Pick and place from estimated poses: planned with the estimated scene, executed in the true scene.
 
     python benchmarks/locate_episodes.py DATASET SCENES... [--robot panda] [--most N] [--seed N] [--least SHARE] [-o FILE]
 
-Scenes are those of ``manitwin layout DATASET --pictures --robot panda``. One camera of each scene looks on, with the noise of a
-depth camera and true masks; every object of which ``--least`` (0.3) is seen is located. Of the view a layout is made (what was
-not found is boxes in it), and one located thing at a time is asked for: it counts where a verified grasp of it is free of all
-that is seen and reached by the arm. The plan, made in the located layout alone, is followed to its end in the true scene without
-a second look: nothing that the simulation knows of poses is used on the way. A success is one of ``manitwin trajectories``:
-within 20 mm and 10 degrees of where the same motion takes the true thing, let go, at rest, nothing else moved or touched.
+The scenes are those of ``manitwin layout DATASET --pictures --robot panda``. One camera of each scene is used, with the noise of
+a depth camera and true masks. Every object with a visible share of at least ``--least`` (0.3) is located. A layout is made from
+the view, in which objects that were not located are boxes. Each located object is then requested in turn. It counts if at least
+one of its verified grasps is free of everything visible and within reach of the arm. The plan, made in the estimated layout
+alone, is executed to its end in the true scene without further perception and without any use of the simulated poses. Success is
+defined as for ``manitwin trajectories``: within 20 mm and 10 degrees of where the same motion takes the true object, released, at
+rest, with no other object moved or touched.
 """
 
 from __future__ import annotations
@@ -52,10 +53,10 @@ LEAST_PX, RIGHT = 200, 0.1
 
 
 class AsPlanned(PickPlaceCourse):
-    """Pick and place as it was planned, with no look at where the thing is on the way."""
+    """Pick and place exactly as planned, without updating the object's pose during execution."""
 
     def execute(self, execution: Execution) -> None:
-        """Follow the plan to its end."""
+        """Execute the plan to its end."""
         plan = self._plan
         self.grasp_and_lift(execution, plan.reach, plan.approach, plan.lift)
         for motion in (plan.carry, plan.lower):
@@ -66,7 +67,7 @@ class AsPlanned(PickPlaceCourse):
 
 
 class Asked:
-    """What is the same for all scenes."""
+    """Settings that are the same for all scenes."""
 
     def __init__(self, dataset: Path, robot: str):
         self.source, self.robot = TwinSource(dataset), load_robot(robot)
@@ -84,7 +85,7 @@ class Asked:
 
 
 def rows_of(asked: Asked, truth: SceneTruth, camera: int, least: float, seed: int) -> list[dict[str, Any]]:
-    """Look at a scene once, and try every located thing that can be grasped."""
+    """Locate the objects of a scene once, try every graspable located one, and return a row for each."""
     picture, rng = truth.pictures[camera % len(truth.pictures)], np.random.default_rng([seed, truth.record.number])
     view = view_of_camera(picture.camera, DepthNoise().observed(picture.depth_m, rng), picture.rgb)
     world_to_camera = OPENGL_TO_OPENCV @ inverse(picture.camera.camera_to_object)
@@ -126,7 +127,7 @@ def rows_of(asked: Asked, truth: SceneTruth, camera: int, least: float, seed: in
 def tried(
     asked: Asked, truth: SceneTruth, scene: LocatedScene, number: int, name: str, reached: list[str], seed: int
 ) -> str:
-    """Plan in the located layout, carry it out in the true scene, and return the outcome."""
+    """Plan in the estimated layout, execute in the true scene, and return the outcome."""
     assert scene.furniture is not None
     believed = [
         replace(each.placed, object_to_world=pose) for each, pose in zip(scene.objects, scene.rest, strict=True)
@@ -179,7 +180,7 @@ def tried(
 
 
 def main() -> None:
-    """Try things of drawn scenes from where they were located."""
+    """Try the objects of rendered scenes with their estimated poses."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("dataset", type=Path)
     parser.add_argument("scenes", type=Path, nargs="+")

@@ -1,12 +1,13 @@
-"""Carry verified grasps to where things were located, and try them at the true pose.
+"""Transfer verified grasps to estimated poses of objects, and try them at the true pose.
 
     python benchmarks/locate_grasps.py DATASET SCENES... [--most N] [--grasps N] [--seed N] [-o FILE]
 
-Scenes are drawn as for ``benchmarks/locate.py``, with the same noise, masks and boards. Of each thing that is found, the
-first ``--grasps`` of its carried grasps (free of the table and of what is seen beside it, the surest to hold first) are
-tried in PhysX by the trial of a build, the hand where it was carried to and the thing where it truly is: what the estimate
-is off by, the grasp is off by. The trial has the one thing alone. In a crowded view few grasps are free: so as many verified
-ones drawn by chance are tried too, whatever is in their way (``drawn``), where the answer is not ambiguous.
+Scenes are rendered as for ``benchmarks/locate.py``, with the same noise, masks and boards. For each located object, the first
+``--grasps`` of its transferred grasps are tried in PhysX with the trial of a build. Only grasps free of the table and of visible
+neighbours are used, those most likely to hold first. The hand is at the estimated pose and the object at its true pose, so that
+the error of the estimate is the error of the grasp. The trial contains only this object. In a crowded view few grasps are free.
+Therefore as many verified ones, drawn at random without regard to obstacles, are tried too (``drawn``) where the pose is not
+ambiguous.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ from manitwin.twin.shares import wilson_interval
 def rows_of(
     dataset: Path, scenes: Path, most: int, count: int, seed: int, kept: Callable[[list[dict[str, Any]]], object]
 ) -> list[dict[str, Any]]:
-    """Locate things of drawn scenes, and try what is carried to them; ``kept`` is given the rows so far."""
+    """Locate the objects of rendered scenes and try their transferred grasps; ``kept`` receives the rows so far."""
     models, source, rng = Models(dataset), TwinSource(dataset), np.random.default_rng(seed)
     rows: list[dict[str, Any]] = []
     for twin_id, share, view, mask, true in questions(scenes, rng):
@@ -83,13 +84,13 @@ def rows_of(
 
 
 def outcomes_of(twin: Twin, gripper: Gripper, gripper_to_object: np.ndarray) -> list[str]:
-    """Return what becomes of grasps in the trial of a build."""
+    """Return the outcome of each grasp in the trial of a build."""
     settings = trial_settings(VerifyConfig(), gripper)
     return [each.outcome for each in SapienTrial().run(twin.rigid_body(), gripper, gripper_to_object, settings)]
 
 
 def told(name: str, rows: list[dict[str, Any]], which: str) -> None:
-    """Print how many of the grasps hold, and of how many things the first one does."""
+    """Print how many of the grasps hold, and for how many objects the first one does."""
     rows = [{**row, "outcomes": row[which]} for row in rows]
     outcomes = [outcome for row in rows for outcome in row["outcomes"]]
     held = outcomes.count("held")
@@ -108,7 +109,7 @@ def told(name: str, rows: list[dict[str, Any]], which: str) -> None:
 
 
 def main() -> None:
-    """Try carried grasps of things in drawn scenes."""
+    """Try transferred grasps of objects in rendered scenes."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("dataset", type=Path)
     parser.add_argument("scenes", type=Path, nargs="+")

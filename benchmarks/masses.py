@@ -1,9 +1,9 @@
-"""Score estimated masses on templates, whose matter and so whose mass is known, with their size and without it.
+"""Score estimated masses on templates, whose materials and masses are known, with and without their size.
 
     python benchmarks/masses.py [--seeds N]
 
-Without it each is taken to be as long as such things usually are, as a photo's thing is. Closed vessels are left out: a template
-of one is empty, and its prior allows for what it holds. An interval is meant to hold 90 % of the true masses.
+Without the size each object is assumed to have the usual length of its category, as for a photo. Closed containers are left out,
+because a template of one is empty while its prior includes the contents. An interval is meant to contain 90 % of the true masses.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FACTOR = 1.6
 
 
 def main() -> None:
-    """Print, with and without the size, how many masses are inside, how wide intervals are, and what is outside."""
+    """Print, with and without the size, the share of masses inside the interval, the width of intervals, and the misses."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=1)
     arguments = parser.parse_args()
@@ -52,7 +52,10 @@ def main() -> None:
 
 
 def made_thing(category: str, seed: int) -> tuple[trimesh.Trimesh, float] | None:
-    """Return a template's closed mesh (m) and mass (kg); None of closed vessels, and of what cannot be made or has no prior."""
+    """Return the closed mesh (m) and the mass (kg) of a template.
+
+    Returns None for closed containers, and where the template cannot be made or has no prior.
+    """
     prior = lookup(category)
     if prior is None or prior.vessel:
         return None
@@ -65,7 +68,7 @@ def made_thing(category: str, seed: int) -> tuple[trimesh.Trimesh, float] | None
 
 
 def estimated(category: str, solid: trimesh.Trimesh, *, metric: bool) -> Estimate:
-    """Return the mass that rules say."""
+    """Return the mass that the rules estimate."""
     subject = Subject(name=category, solid=solid, parts=(), metric=metric, views=(), cameras=(), seed=0)
     mass = estimate_physical(subject, lookup(category)).mass_kg
     assert mass is not None

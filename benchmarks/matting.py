@@ -1,13 +1,13 @@
-"""Cut the object out of composites whose mask is known, and print what was accepted, how right it is, and what it cost.
+"""Cut objects out of composites with known masks, and print the acceptance, its precision, and the cost.
 
     python benchmarks/matting.py [--part held-out|tuning|calibration] [--first 0] [--count 300] [--jobs 1] [--network isnet]
                                  [--variant plain|labelled|matched|small|shop|black] [--named] [--photos FOLDER] [--sheet PNG]
 
-The pictures are made here (``composites.py``), of templates on grounds of the project's own making; the held-out part has other
-seeds and other grounds than the part that thresholds were set on. A composite of one whole thing is to be accepted; one that
-the frame cuts, or with several things, is to be rejected. IoU is that of the matte (alpha above a half) with the truth.
-With ``--named`` the name is given, so that the outline of its template counts where a cut-out is doubtful by itself.
-With ``--photos`` a folder's photos are cut out besides; ``--sheet`` draws what was accepted of them.
+The pictures are generated here (``composites.py``) from templates on grounds that the project generates itself. The held-out part
+has other seeds and other grounds than the part with which thresholds were set. A composite of one whole object is to be accepted;
+one that the frame cuts off, or with several objects, is to be rejected. IoU is that of the matte (alpha above 0.5) with the true
+mask. With ``--named`` the name is given, so that the silhouette of its template is used where a cut-out is doubtful. With
+``--photos`` the photos of a folder are cut out as well, and ``--sheet`` draws those accepted.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ TILE_PX = 460
 
 @dataclass(frozen=True)
 class Judged:
-    """One composite: its kind and setting, the confidence in what was found and its true IoU, what became of it, its cost."""
+    """Result for one composite: kind, setting, confidence, true IoU, outcome and cost."""
 
     kind: str
     setting: str
@@ -57,13 +57,13 @@ class Judged:
 
 
 def judged_by_number(part: Part, number: int, variant: Variant, network: str | None, named: bool) -> Judged:
-    """Make one composite and cut it out, in whatever process."""
+    """Make one composite by its number and cut it out; can be called in any process."""
     cv2.setNumThreads(1)
     return judge(composite(part, number, variant), find_networks(network) if network else (), named)
 
 
 def judge(picture: Composite, networks: Sequence[Network], named: bool) -> Judged:
-    """Cut one composite out; what was rejected is judged too."""
+    """Cut one composite out; rejected results are compared with the truth too."""
     start = time.process_time()
     study = study_in_turn(picture.rgb, networks, min_confidence=MIN_CONFIDENCE)
     explains = template_outline_check(picture.category) if named else None
@@ -114,18 +114,18 @@ def report(judged: list[Judged]) -> None:
 
 
 def with_interval(part: int, whole: int) -> str:
-    """Return a share in per cent with its 95 % interval."""
+    """Return a share in percent with its 95 % confidence interval."""
     low, high = wilson_interval(part, whole)
     return f"{share(part, whole)} ({100 * low:.0f} to {100 * high:.0f})"
 
 
 def share(part: int, whole: int) -> str:
-    """Return a share in per cent."""
+    """Return a share in percent."""
     return f"{100 * part / whole:.0f} %" if whole else "none"
 
 
 def photos(folder: Path, networks: Sequence[Network], sheet: Path | None) -> None:
-    """Cut the photos of a folder out, print what became of each, and draw those accepted beside what was cut out."""
+    """Cut out the photos of a folder, print the result of each, and draw the accepted ones beside their cut-outs."""
     tiles, costs, count = [], [], 0
     paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".jpg", ".jpeg", ".png", ".webp"))
     for path in paths:
@@ -148,7 +148,7 @@ def photos(folder: Path, networks: Sequence[Network], sheet: Path | None) -> Non
 
 
 def tile(rgba: np.ndarray) -> np.ndarray:
-    """Return a photo beside what was cut out of it, on magenta."""
+    """Return a photo beside its cut-out on a magenta background."""
     scale = TILE_PX / max(rgba.shape[:2])
     small = cv2.resize(rgba, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     alpha = small[..., 3:] / 255.0

@@ -1,12 +1,13 @@
-"""Fit how likely a cut-out is right to pictures whose mask is known, and print what limits of confidence would accept.
+"""Fit the confidence of cut-outs to pictures with known masks, and print what limits on it would accept.
 
     python benchmarks/matting_belief.py [--first 0] [--count 600] [--photo-seeds 0,1] [--jobs 2] [-o belief.json]
 
-The pictures are composites of the calibration part (``composites.py``), which nothing else is set on, every other one also with a
-label, the others also with a part of the ground's colour and also small (``composite_variants.py``), and photos of templates of
-the tuning seeds (``template_photos.py``), every third category; belief.json lies in src/manitwin/models/matting. Logistic
-regression with an L2 penalty and no negative weight; the penalty is chosen by cross-validation over pictures, and the table is of
-predictions for pictures that were left out. ``matting.py`` measures what comes out on the held-out part.
+The pictures are composites of the calibration part (``composites.py``), which is used for nothing else. Every second one is also
+used with a label, the others also with a part in the colour of the ground and also small (``composite_variants.py``). Photos of
+templates of the tuning seeds (``template_photos.py``) are added for every third category. belief.json lies in
+src/manitwin/models/matting. The model is a logistic regression with an L2 penalty and no negative weight. The penalty is chosen
+by cross-validation over pictures, and the table shows predictions for pictures that were left out. ``matting.py`` measures the
+result on the held-out part.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from manitwin.models.matting import belief
 from manitwin.models.matting.study import drawn, judged_candidates
 
 FOLDS, SEED = 5, 0
-PHOTOS_FROM = 1_000_000  # numbers of template photos, beyond those of composites
+PHOTOS_FROM = 1_000_000  # numbers of template photos, above those of composites
 PHOTO_CATEGORIES_EVERY = 3
 PENALTIES = (0.00003, 0.0001, 0.0003, 0.001, 0.003, 0.01)
 LIMITS = (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)
@@ -43,14 +44,16 @@ VARIANTS: tuple[tuple[Variant, int, int], ...] = (
     ("matched", 1, 2),
     ("small", 1, 2),
 )
-"""Of composites: from which of them on one of how many is drawn so."""
+"""Variants of composites: name, first number, and step between the numbers that are drawn in this variant."""
 
 
 @dataclass(frozen=True)
 class Example:
-    """A candidate mask of a picture: its ``features``, whether it is ``right``, whether the picture shows one whole thing.
+    """A candidate mask of a picture: its ``features``, whether it is ``right``, and whether the picture shows one ``whole``
+    object.
 
-    ``number`` is the picture's, ``group`` that of all that is never parted in cross-validation, ``source`` says what it is.
+    ``number`` is that of the picture, ``group`` the cross-validation group that is never split, and ``source`` the kind of
+    picture.
     """
 
     number: int
@@ -62,7 +65,7 @@ class Example:
 
 
 def examples(number: int) -> list[Example]:
-    """Make one composite in its variants; return their candidates."""
+    """Make one composite in its variants and return their candidates."""
     cv2.setNumThreads(1)
     return [
         each
@@ -75,7 +78,7 @@ def examples(number: int) -> list[Example]:
 
 
 def photo_examples(thing: tuple[int, str, int]) -> list[Example]:
-    """Photograph one thing, given by its number, category and seed; return the candidates of all its photos."""
+    """Photograph one object, given by number, category and seed, and return the candidates of all its photos."""
     cv2.setNumThreads(1)
     number, category, seed = thing
     photos = photograph(category, seed)
@@ -96,7 +99,10 @@ def examples_of(number: int, group: int, source: str, picture: Composite | Templ
 
 
 def fitted(features: np.ndarray, right: np.ndarray, penalty: float) -> tuple[float, np.ndarray]:
-    """Return bias and weights (F,), none negative but the maker's, of features (N, F) in their own units."""
+    """Return the bias and the weights ``(F,)`` for features ``(N, F)`` in their own units.
+
+    No weight is negative, except that of the method that made the candidate.
+    """
     spread = np.maximum(features.std(0), 1e-6)
     x = (features - belief.BEST) / spread
 
@@ -113,7 +119,7 @@ def fitted(features: np.ndarray, right: np.ndarray, penalty: float) -> tuple[flo
 
 
 def predicted(features: np.ndarray, right: np.ndarray, groups: np.ndarray, penalty: float) -> np.ndarray:
-    """Return the probability (N,) of each example from fits to the pictures of other folds."""
+    """Return the probability ``(N,)`` of each example, from models fitted to the pictures of the other folds."""
     fold = np.random.default_rng(SEED).integers(0, FOLDS, int(groups.max()) + 1)[groups]
     out = np.zeros(len(features))
     for each in range(FOLDS):
@@ -123,7 +129,7 @@ def predicted(features: np.ndarray, right: np.ndarray, groups: np.ndarray, penal
 
 
 def report(made: list[Example]) -> tuple[float, np.ndarray]:
-    """Print what limits would accept, by predictions for pictures that were left out; return bias and weights of all."""
+    """Print what limits would accept, using predictions for left-out pictures, and return bias and weights fitted to all."""
     features = np.array([each.features for each in made])
     right = np.array([each.right for each in made])
     numbers = np.array([each.number for each in made])
@@ -153,7 +159,7 @@ def report(made: list[Example]) -> tuple[float, np.ndarray]:
 
 
 def write(path: Path, bias: float, weights: np.ndarray, made: list[Example]) -> None:
-    """Write bias and weights, and what they were fitted to."""
+    """Write bias and weights, and a description of the data they were fitted to."""
     numbers = sorted({each.group for each in made if each.group < PHOTOS_FROM})
     photos = len({each.number for each in made if each.number >= PHOTOS_FROM})
     composites = f"calibration composites {numbers[0]} to {numbers[-1]}" if numbers else "no composites"
@@ -166,7 +172,7 @@ def write(path: Path, bias: float, weights: np.ndarray, made: list[Example]) -> 
 
 
 def main() -> None:
-    """Make pictures, fit, and print."""
+    """Make the pictures, fit, and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=600)

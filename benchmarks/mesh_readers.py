@@ -1,8 +1,8 @@
-"""Compare what two readers make of the same models: `python benchmarks/mesh_readers.py FOLDER OTHER`.
+"""Compare the results of two readers for the same models: `python benchmarks/mesh_readers.py FOLDER OTHER`.
 
-Files of the same name but for the suffix, below one folder and the other (such as the glTF and the FBX of a kit), are read and
-compared up to a common factor of length: bounds within a thousandth of the longest side, area within a thousandth, and whether
-they have textures. Prints how many are alike, and of each that is not what differs.
+Files with the same name except for the suffix, below two folders (such as the glTF and the FBX of a kit), are read and compared
+up to a common factor of length: bounds and area within 0.1 %, and whether they have textures. Prints how many agree, and the
+differences of each pair that does not.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LIKE = 1e-3
 
 @dataclass(frozen=True)
 class Measured:
-    """What is compared of a file: ``low`` and ``high`` corners (3,) and ``area`` in its own unit, and whether it has textures."""
+    """Measured properties of a file: ``low`` and ``high`` corners ``(3,)`` and ``area`` in its own unit, and textures."""
 
     low: np.ndarray
     high: np.ndarray
@@ -33,7 +33,7 @@ class Measured:
 
     @property
     def longest(self) -> float:
-        """The longest side of its box."""
+        """Longest side of the bounding box, in the file's unit."""
         return float((self.high - self.low).max())
 
 
@@ -80,7 +80,7 @@ def measured(path: Path) -> Measured:
 
 
 def differences(one: Measured, other: Measured) -> list[str]:
-    """Return what is not alike of two measured files, up to a factor of length."""
+    """Return the properties in which two files differ, up to a factor of length."""
     factor = other.longest / one.longest
     off = LIKE * other.longest
     found = []

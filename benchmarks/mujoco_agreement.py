@@ -1,10 +1,10 @@
-"""Whether masses, centres and inertias that are read of MJCF and URDF files are those of MuJoCo's own compiler.
+"""Compare masses, centres and inertias read from MJCF and URDF files with those of MuJoCo's own compiler.
 
 python benchmarks/mujoco_agreement.py FOLDER...                  every MJCF and URDF asset below the folders
 python benchmarks/mujoco_agreement.py FOLDER... --most 40        so many of each folder, drawn with --seed
 
-MuJoCo is given the file itself, in a process of its own; the bodies that the reader took as one are summed in the
-world's axes and compared with what was read, as far as the file declares it. Prints each asset that differs, and the counts.
+MuJoCo loads the file itself, in a separate process. The bodies that the reader merged into one are summed in world axes and
+compared with the values read, as far as the file declares them. Prints each asset that differs, and the counts.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
 FORMATS = ("mjcf", "urdf")
 LIMITS = Limits(120.0, 8 << 30)
 NEAR = 1e-3
-"""Relative to mass and to the largest moment; of centres, to the longest side."""
+"""Tolerance relative to the mass and to the largest moment; for centres relative to the longest side."""
 
 
 def compared(path: Path, root: Path) -> tuple[str, str]:
-    """Return what came of one asset (agrees, differs, or why it cannot be said) and the numbers that differ."""
+    """Return the result for one asset (agrees, differs, or why it cannot be compared) and the numbers that differ."""
     try:
         asset = read_asset(path, root=root)
     except AssetError as error:
@@ -53,12 +53,15 @@ def compared(path: Path, root: Path) -> tuple[str, str]:
 
 
 def head_of(asset: Asset, model: mujoco.MjModel, root: Path) -> int | None:
-    """Return the first body of the rigid group that the reader takes: by its name, else the first free one, else with a shape."""
+    """Return the first body of the rigid group that the reader takes.
+
+    It is found by its name, else it is the first free body, else the first one with a shape.
+    """
     name = asset.name if asset.format == "mjcf" else str(open_urdf(asset.path, root).links[0][0].get("name"))
     named = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
     if named > 0 and (
         model.body_parentid[named] == 0 or model.body_jntnum[named]
-    ):  # else a file's name is a part's too
+    ):  # otherwise a file's name is that of a part too
         return int(named)
     heads = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0 or model.body_jntnum[b]]
     shaped = [head for head in heads if any(_is_solid(model, body) for body in group_of(model, head))]
@@ -67,7 +70,7 @@ def head_of(asset: Asset, model: mujoco.MjModel, root: Path) -> int | None:
 
 
 def group_of(model: mujoco.MjModel, head: int) -> list[int]:
-    """Return a body and all that is welded to it."""
+    """Return a body and all bodies welded to it."""
     group = [head]
     for body in range(head + 1, model.nbody):
         if model.body_parentid[body] in group and not model.body_jntnum[body]:
@@ -79,7 +82,7 @@ def _is_solid(model: mujoco.MjModel, body: int) -> bool:
     first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
     geoms = [
         geom for geom in range(first, first + count) if model.geom_type[geom] not in (0, 1)
-    ]  # planes, height fields
+    ]  # planes and height fields
     return any(model.geom_group[g] < 3 or model.geom_contype[g] or model.geom_conaffinity[g] for g in geoms)
 
 
@@ -88,7 +91,7 @@ def _is_free(model: mujoco.MjModel, body: int) -> bool:
 
 
 def summed(model: mujoco.MjModel, head: int) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return mass, centre and inertia about it of a body and all that is welded to it, in the head's axes."""
+    """Return mass, centre, and inertia about the centre of a body and all bodies welded to it, in the head's axes."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
@@ -106,7 +109,7 @@ def summed(model: mujoco.MjModel, head: int) -> tuple[float, np.ndarray, np.ndar
 
 
 def differences(asset: Asset, mass_kg: float, center_m: np.ndarray, inertia_kg_m2: np.ndarray) -> str:
-    """Return what of a read asset's declared mass properties differs from these, in words; empty where nothing does."""
+    """Describe in which declared mass properties an asset differs from the given ones; empty if in none."""
     said, apart = asset.inertial, []
     if said.mass_kg is None or abs(said.mass_kg - mass_kg) > NEAR * mass_kg:
         apart.append(f"mass {said.mass_kg!r} and {mass_kg:.6g} kg")
@@ -125,7 +128,7 @@ def differences(asset: Asset, mass_kg: float, center_m: np.ndarray, inertia_kg_m
 
 
 def main() -> None:
-    """Compare the assets below the folders and print what differs."""
+    """Compare the assets below the folders and print the differences."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--most", type=int)

@@ -1,13 +1,13 @@
-"""Measure the classifier that names photos, on pictures whose truth is known: templates rendered over made backgrounds.
+"""Measure the classifier that names photos, on pictures with known truth: templates rendered over generated backgrounds.
 
     python benchmarks/naming.py [--seeds N] [--limits FILE] [--photos MANIFEST.csv FOLDER] [--meshes] [--twins FOLDER]
 
-Every template is drawn from three elevations and laid over a plain, wooden, cloudy or two-part ground with a soft shadow. The
-categories are split in halves: the temperature and the limits of one half are tried on the other. ``--limits`` writes those
-of all categories, as ``models/classifiers/name_limits.csv`` holds them: the highest probability that any picture of another
-thing gave a name. ``--photos`` prints what photos are named, with the truth of a manifest's column ``category``; nothing is
-set by them. ``--meshes`` names the templates' meshes as a build names what has no name, by six views, with and without their
-size; ``--twins`` does so with finished twins, whose names are their truth.
+Every template is rendered from three elevations over a plain, wooden, cloudy or two-part ground with a soft shadow. The
+categories are split in halves; the temperature and the limits of one half are tested on the other. ``--limits`` writes those of
+all categories in the format of ``models/classifiers/name_limits.csv``: for each name the highest probability that any picture of
+another object gave it. ``--photos`` prints the names given to photos, with the truth in a manifest's column ``category``; no
+parameter is set with them. ``--meshes`` names the templates' meshes as a build names unnamed objects, from six views, with and
+without their size. ``--twins`` does the same with finished twins, whose names are the truth.
 """
 
 from __future__ import annotations
@@ -48,8 +48,7 @@ ELEVATIONS_DEG = (12.0, 35.0, 62.0)
 SEEN_IN_PHOTOS = {
     "can opener": 0.907, "compact": 0.760, "envelope": 0.820, "mobile phone": 0.866, "remote control": 0.845,
 }  # fmt: skip
-"""What real photos of other things (pliers, a halved melon, a plastic folder, a calculator, a pencil box) gave these names: more
-than any render did."""
+"""Probability of these names in real photos of other objects, such as pliers or a calculator; above that in any render."""
 LIMITS = (0.5, 0.6, 0.7, 0.8, 0.9)
 LIMIT = NamingConfig().min_probability
 WITHIN = 1.6
@@ -63,7 +62,7 @@ ALSO_RIGHT = {
     "notebook": ("book",), "saucepan": ("pot",), "tissue box": ("box",), "pitcher": ("jug",), "trash can": ("bucket",),
     "tennis ball": ("ball",),
 }  # fmt: skip
-"""What a person would accept a template's thing to be called, beside its category."""
+"""Names that a person would accept for a template's object besides its category."""
 
 
 def main() -> None:
@@ -110,12 +109,12 @@ def main() -> None:
 
 
 def right_names(category: str) -> set[str]:
-    """Return what a template's thing may be called."""
+    """Return the accepted names of a template's object."""
     return {category, *ALSO_RIGHT.get(category, ())}
 
 
 def looks(seeds: int) -> list[tuple[str, np.ndarray]]:
-    """Return of each picture the template's category and the logits of its looks ``(3, 1000)``."""
+    """Return the template's category and the logits of its crops ``(3, 1000)`` for each picture."""
     templates, rows = load_templates(), []
     for number, category in enumerate(sorted(templates)):
         for seed in range(seeds):
@@ -137,7 +136,7 @@ def looks(seeds: int) -> list[tuple[str, np.ndarray]]:
 
 
 def composite(rgb: np.ndarray, coverage: np.ndarray, rng: np.random.Generator, side_px: int = 384) -> np.ndarray:
-    """Return a render ``(H, W, 3)`` laid over a ground, lit and shadowed, with its true matte ``(side, side, 4) uint8``."""
+    """Return a render ``(H, W, 3)`` over a ground with light and shadow, with its matte ``(side, side, 4) uint8``."""
     alpha = coverage[..., None]
     own = rgb.astype(np.float32) - (1 - alpha) * np.array(BACKDROP, np.float32)
     rows, columns = np.nonzero(coverage > 0.5)
@@ -157,7 +156,7 @@ def composite(rgb: np.ndarray, coverage: np.ndarray, rng: np.random.Generator, s
 
 
 def ground(rng: np.random.Generator, side_px: int) -> np.ndarray:
-    """Return a made background ``(side, side, 3) float32``: plain with a gradient, wood, clouds, or wall and table."""
+    """Return a generated background ``(side, side, 3) float32``: plain with a gradient, wood, clouds, or wall and table."""
     kind = rng.integers(4)
     base = rng.uniform(30, 245, 3) if rng.random() < 0.4 else rng.uniform(40, 250) + rng.normal(0, 10, 3)
     y, x = np.mgrid[:side_px, :side_px] / side_px
@@ -179,14 +178,14 @@ def _noise(rng: np.random.Generator, side_px: int, rows: int, columns: int) -> n
 
 
 def probabilities(seen: np.ndarray, temperature: float = TEMPERATURE) -> dict[str, float]:
-    """Return the mean probability of each name, wider words included."""
+    """Return the mean probability of each name, including more general names."""
     table, shares = load_names(), softmax(seen / temperature).mean(axis=0)
     single = dict(zip(table.names, (table.members @ shares).tolist(), strict=True))
     return dict(zip(table.general, (table.general_members @ shares).tolist(), strict=True)) | single
 
 
 def log_loss(rows: list[tuple[str, np.ndarray]], temperature: float) -> float:
-    """Return the mean log loss of the right names, over the things that ImageNet has a class of."""
+    """Return the mean log loss of the right names, over the objects that have an ImageNet class."""
     table, losses = load_names(), []
     for category, seen in rows:
         right = [table.members[table.names.index(n)] for n in right_names(category) if n in table.names]
@@ -197,7 +196,7 @@ def log_loss(rows: list[tuple[str, np.ndarray]], temperature: float) -> float:
 
 
 def highest_wrong(rows: list[tuple[str, np.ndarray]]) -> dict[str, float]:
-    """Return the highest probability that a picture of another thing gives each name."""
+    """Return the highest probability of each name in a picture of another object."""
     table = load_names()
     highest = dict.fromkeys((*table.general, *table.names), 0.0)
     for category, seen in rows:
@@ -218,7 +217,7 @@ def verdict(category: str, seen: np.ndarray, limit: float, highest: dict[str, fl
 
 
 def print_sizes(part_of: str, rows: list[tuple[str, np.ndarray]], highest: dict[str, float]) -> None:
-    """Print how far the usual size and bulk density of anything, and of likely names, are from those of unnamed things."""
+    """Print the usual size and bulk density of all and of likely categories in comparison with those of unnamed objects."""
     names, off = load_names().names, []
     for category, seen in rows:
         truth = named(category)
@@ -246,7 +245,7 @@ def print_sizes(part_of: str, rows: list[tuple[str, np.ndarray]], highest: dict[
 
 
 def print_photos(manifest: Path, folder: Path) -> None:
-    """Print what photos are named; one whose object cannot be cut out is named by the whole picture."""
+    """Print the names given to photos; a photo whose object cannot be cut out is named by the whole picture."""
     with manifest.open(newline="", encoding="utf-8") as file:
         truth = {Path(row["file"]).name: row["category"] for row in csv.DictReader(file)}
     for path in sorted(folder.glob("*.jpg")):
@@ -262,7 +261,7 @@ def print_photos(manifest: Path, folder: Path) -> None:
 
 
 def template_meshes(seeds: int) -> Iterator[tuple[str, float, list[np.ndarray]]]:
-    """Yield of each made thing its category, its length (m) and the views of it that a name goes by."""
+    """Yield for each built object its category, its length (m) and the views by which it is named."""
     templates = load_templates()
     for category in sorted(templates):
         for seed in range(seeds):
@@ -274,7 +273,7 @@ def template_meshes(seeds: int) -> Iterator[tuple[str, float, list[np.ndarray]]]
 
 
 def finished_twins(folder: Path) -> Iterator[tuple[str, float, list[np.ndarray]]]:
-    """Yield of each finished twin its name or category, its length (m) and the views of it that a name goes by."""
+    """Yield for each finished twin its name or category, its length (m) and the views by which it is named."""
     for path in sorted(folder.glob("twins/*/*/twin.json")):
         twin = Twin(path.parent)
         seen = [np.asarray(Image.open(picture).convert("RGB")) for picture in pictures(path.parent / "views", "rgb")]
@@ -283,7 +282,7 @@ def finished_twins(folder: Path) -> Iterator[tuple[str, float, list[np.ndarray]]
 
 
 def print_sized(what: str, things: Iterator[tuple[str, float, list[np.ndarray]]]) -> None:
-    """Print how many are named, and how many of these right, without and with their size, by category in halves."""
+    """Print how many objects are named, and how many correctly, with and without their size, by half of the categories."""
     counts: dict[tuple[bool, int], list[int]] = {}
     categories: dict[str, int] = {}
     for category, longest_m, views in things:

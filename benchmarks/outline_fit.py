@@ -1,9 +1,9 @@
-"""Print how near roughly drawn outlines come to the true ones when they are fitted to edges (``manitwin review cutouts --draw``).
+"""Measure the accuracy of roughly drawn outlines after fitting them to edges (``manitwin review cutouts --draw``).
 
     python benchmarks/outline_fit.py [--part held-out] [--count 120]
 
-The pictures are composites (``composites.py``), cut and doubtful ones too. An outline is drawn as a person would: the
-true one as a polygon with few of them, each off by some pixels.
+The pictures are composites (``composites.py``), including cut and doubtful ones. A hand-drawn outline is simulated by a polygon
+of the true contour with few corners, each displaced by some pixels.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from composites import SEEDS, composite
 from manitwin.models.matting.fitted_outline import fit_outline
 
 CORNER_SHARE, OFF_SHARE = 0.012, 0.008
-"""Of a thing's diagonal: how far the polygon leaves the outline, and by how much a corner is off (standard deviation)."""
+"""Relative to the diagonal of the object: tolerance of the polygon, and standard deviation of its corners."""
 LEAST_SHARE = 0.005
 RIGHT_IOU = 0.95
 
 
 def drawn(truth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return the largest piece of a mask ``(H, W) bool`` as somebody would draw it, its holes filled."""
+    """Return the largest component of a mask ``(H, W) bool`` as a person would draw it, with holes filled."""
     found, _ = cv2.findContours(truth.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     outline = max(found, key=cv2.contourArea)
     diagonal_px = float(np.hypot(*np.ptp(outline[:, 0], axis=0)))
@@ -36,12 +36,12 @@ def drawn(truth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def iou(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the intersection over the union of two masks."""
+    """Return the intersection over union of two masks."""
     return float((one & other).sum() / max((one | other).sum(), 1))
 
 
 def main() -> None:
-    """Draw, fit and compare."""
+    """Draw the outlines, fit them and compare them with the truth."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--part", choices=sorted(SEEDS), default="held-out")
     parser.add_argument("--count", type=int, default=120)

@@ -1,13 +1,13 @@
-"""Score the parts that are told by form against the parts of templates, which are known by construction.
+"""Score the parts recognised by shape against the parts of templates, which are known by construction.
 
     python benchmarks/parts.py [--first SEED] [--seeds N] [--held-out] [--every K] [--rules NAME,NAME]
 
-The surface is told apart by the rule of its category's form alone: the template's own parts are not looked at. Clean is the mesh
-as built; rough has its edges cut to 1/40 of the size, is smoothed by 15 rounds of Taubin's filter and shaken by 0.3 mm of noise,
-as scans and generators leave meshes. A part's truth is the union of the template's finer ones that ``TRUE_ROLES`` gives its role.
-The score of a thing is the mean intersection over union by area of its parts, true or told. What shows no parts by its rule is
-counted as not told, and scored by nothing. Halves of the categories are those of ``points.py``; nothing is set by the held-out
-one.
+The surface is segmented by the shape rule of its category alone, without the template's own parts. ``Clean`` is the mesh as
+built. ``Rough`` has its edges subdivided to 1/40 of the size, is smoothed by 15 rounds of Taubin's filter and has 0.3 mm of
+noise, like meshes from scans and generators. The truth of a part is the union of the template's finer parts that ``TRUE_ROLES``
+assigns to its role. The score of an object is the mean intersection over union by area of its true and recognised parts. Objects
+for which the rule recognises no parts are counted separately and not scored. The categories are split into the halves of
+``points.py``; no parameter is set with the held-out half.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ TRUE_ROLES: dict[PartRule, tuple[str, dict[str, str]]] = {
     "arched": ("band", {"cups": "cup"}),
     "sectioned": ("shaft", {}),
 }
-"""By rule, the role of parts that are not named here, and of those that are. The faces of flat things are not built as parts."""
+"""For each rule the role of parts not named here, and the roles of those named. Faces of flat objects are no template parts."""
 SECTIONS = {
     "allen key": {},
     "battery": {"pole": "tip"},
@@ -56,11 +56,13 @@ SECTIONS = {
     "umbrella": {"handle": "end"},
     "wrench": {"jaw": "tip", "ring": "end", "hole": "end"},
 }
-"""Of long things the sections, by category; all else is shaft. A told section counts for the true one that it is most like:
-which is called the shaft is a convention. An allen key is one bar that is bent: no part of the template begins
-where its arms meet."""
+"""Sections of long objects by category; everything else is the shaft.
+
+A recognised section counts as the most similar true one, because which of them is called the shaft is a convention. An allen key
+is one bent bar: no part of the template begins where its arms meet.
+"""
 RIM_M, RIM_SHARE = 0.018, 0.4
-"""A rim is what a finger pad covers on either side of the template's own rim, at most so much of height or radius."""
+"""A rim is the area that a finger pad covers on both sides of the template's rim, at most this share of height or radius."""
 CLEAN_BAR, ROUGH_BAR = 0.88, 0.78
 
 
@@ -99,7 +101,7 @@ def main() -> None:
 
 
 def scored(category: str) -> bool:
-    """Tell whether the template's parts say where the rule's borders are: a flashlight's head and barrel are one of them."""
+    """Tell whether the template's parts have the borders of the rule; a flashlight's head and barrel are one part."""
     prior, templates = lookup(category), load_templates()
     if prior is None or prior.parts not in TRUE_ROLES:
         return False
@@ -111,7 +113,7 @@ def scored(category: str) -> bool:
 
 
 def score(category: str, seed: int, rough: bool) -> float | None:
-    """Return the mean IoU of a thing's parts, None where none are told."""
+    """Return the mean IoU of an object's parts, or None where none are recognised."""
     templates, prior = load_templates(), lookup(category)
     assert prior is not None and prior.parts is not None
     made = make(templates[category], read_text(category, templates), np.random.default_rng(seed))
@@ -132,7 +134,7 @@ def score(category: str, seed: int, rough: bool) -> float | None:
         answer = by_best_match(answer, truth, areas)
     answer = np.where(np.isin(answer, [rest, *roles.values()]), answer, rest)
     if prior.parts in ("open", "closed") and not np.isin(("base", "underside"), made.mesh.names).any():
-        answer = np.where(answer == "base", rest, answer)  # the template does not tell its base from its wall
+        answer = np.where(answer == "base", rest, answer)  # the template has one part for base and wall
     each = [
         areas[(answer == role) & (truth == role)].sum() / areas[(answer == role) | (truth == role)].sum()
         for role in np.union1d(truth, answer)
@@ -141,7 +143,7 @@ def score(category: str, seed: int, rough: bool) -> float | None:
 
 
 def by_best_match(answer: np.ndarray, truth: np.ndarray, areas: np.ndarray) -> np.ndarray:
-    """Return for each told section the true one with which its intersection over union is the best."""
+    """Return for each recognised section the true one with the highest intersection over union."""
     names, matched = np.unique(truth), answer.copy()
     for told in np.unique(answer):
         mine = answer == told
@@ -151,7 +153,7 @@ def by_best_match(answer: np.ndarray, truth: np.ndarray, areas: np.ndarray) -> n
 
 
 def with_rim(mesh: trimesh.Trimesh, truth: np.ndarray) -> np.ndarray:
-    """Return the roles of a vessel's faces; those of which most is near the faces of its rim are of it too."""
+    """Return the roles of a container's faces; faces mostly near its rim get the role of the rim."""
     rim = np.asarray(mesh.triangles_center)[truth == "rim"]
     if not len(rim):
         return truth
@@ -165,7 +167,7 @@ def with_rim(mesh: trimesh.Trimesh, truth: np.ndarray) -> np.ndarray:
 
 
 def roughened(mesh: trimesh.Trimesh, part: np.ndarray) -> tuple[trimesh.Trimesh, np.ndarray]:
-    """Return a mesh as scans and generators leave it, with the parts of its faces."""
+    """Return a mesh like those of scans and generators, with the part of each face."""
     vertices, faces, of_face = cut_up(mesh.vertices, mesh.faces, float(mesh.extents.max()) / 40)
     fine = trimesh.smoothing.filter_taubin(trimesh.Trimesh(vertices, faces, process=False), iterations=15)
     shaken = fine.vertices + np.random.default_rng(0).normal(0, 0.0003, fine.vertices.shape)

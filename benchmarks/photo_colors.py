@@ -1,16 +1,16 @@
-"""Score the colours that are read off a photo, on photos of templates whose own colours are known.
+"""Score the colours read from a photo, on photos of templates whose colours are known.
 
     python benchmarks/photo_colors.py [--seeds N] [--every K] [--held-out] [--metals]
 
-Each thing is a template in a drawn colour word (``WORDS`` of ``colors.py``), rendered on one of the grounds of
-``template_photos.py`` with light, shadow and the sheen of its surroundings. A camera then chooses an exposure by the
-picture's mean (``MEANS``, whatever the ground is), has a white balance that is a little off, and a lens that spreads some of
-the whole picture's light over it (veiling glare, 0 to 3 %). Scored are the names of the pixels of the true mask, as they are
-and with the photo's light discounted. Questions, halves and what people call a colour are those of ``colors.py``, but that
-black has to be called black.
+Each object is a template in a drawn colour word (``WORDS`` of ``colors.py``), rendered on one of the grounds of
+``template_photos.py`` with light, shadow and reflections of its surroundings. A simulated camera chooses the exposure by the
+picture's mean (``MEANS``, independent of the ground), has a small error of white balance, and spreads up to 3 % of the picture's
+light over the whole picture (veiling glare). The names of the pixels inside the true mask are scored, unchanged and after
+discounting the illuminant. The questions, the halves and the accepted names are those of ``colors.py``, except that black must be
+called black.
 
-``--metals``: things of gold-coloured steel, brass, steel and copper, and of enamel in other colours, once each: which are called
-gold, as anything is and as metal in a photo is.
+``--metals`` takes objects of gold-coloured steel, brass, steel and copper, and of enamel in other colours, once each, and prints
+which are called gold, as any object and as metal in a photo.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import MATERIALS, color_of
 
 MEANS = (0.15, 0.55)
-"""Mean linear luminance of a picture: a meter's 18 % grey, to what people correct it to for pale grounds."""
-WHITE_PAPER_AT_MOST = 1.1  # of the picture's white: nobody keeps a photo whose paper is all burnt out
+"""Range of the mean linear luminance of a picture, from a meter's 18 % grey to the corrected exposure of pale grounds."""
+WHITE_PAPER_AT_MOST = 1.1  # relative to the picture's white: photos with fully clipped paper are not kept
 GLARE = (0.0, 0.03)
 BALANCE = 0.05
 NOISE = 1.5
@@ -44,7 +44,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def main() -> None:
-    """Print the shares of right names with and without the light, and what is wrong with it."""
+    """Print the shares of correct names with and without discounting the light, and the errors with it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--every", type=int, default=1, help="every Kth category")
@@ -89,7 +89,7 @@ ENAMELS = ("olive", "brown", "tan", "beige", "cream", "yellow", "orange", "khaki
 
 
 def print_metals(only_held_out: bool) -> None:
-    """Print how many things of each matter and colour are called gold."""
+    """Print how many objects of each material and colour are called gold."""
     wishes = {
         "gold steel": Wish(rgb=color_of("gold"), material=MATERIALS["steel"]),
         "brass": Wish(material=MATERIALS["brass"]),
@@ -115,12 +115,15 @@ ALL = {"first", "no false", "all"}
 
 
 def is_said(said: str, truth: str) -> bool:
-    """Tell whether people call a colour of that word so, and nobody calls black dark grey."""
+    """Tell whether ``said`` is an accepted name of ``truth``; dark grey is not accepted for black."""
     return said == "black" if truth == "black" else is_called(said, truth)
 
 
 def draw(category: str, word: str, case: int) -> tuple[np.ndarray, dict[str, float]] | None:
-    """Return a photo ``(H, W, 4) uint8``, its alpha the true mask, and the shares of the thing's colours; None for bare metal."""
+    """Return a photo ``(H, W, 4) uint8`` with the true mask as alpha, and the shares of the object's colours.
+
+    Returns None for bare metal.
+    """
     rgb = tuple(int(COLORS[word][i : i + 2], 16) / 255 for i in (0, 2, 4))
     rng = np.random.default_rng([case, 1])
     elevation = float(rng.choice([10.0, 30.0, 55.0]))
@@ -130,7 +133,7 @@ def draw(category: str, word: str, case: int) -> tuple[np.ndarray, dict[str, flo
         return None
     looks = [photo.made.looks[photo.made.mesh.names[part]] for part in photo.made.mesh.part]
     if np.average([look.metallic for look in looks], weights=photo.truth.area_faces) > 0.5:
-        return None  # the colour of a mirror is that of its surroundings
+        return None  # a mirror shows the colour of its surroundings
     alpha = np.where(photo.mask, 255, 0).astype(np.uint8)
     return np.dstack([as_a_camera_has_it(photo.rgb, rng), alpha]), true_shares(photo.made, photo.truth)
 
@@ -148,13 +151,13 @@ def as_a_camera_has_it(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def names_of(rgba: np.ndarray, rng: np.random.Generator) -> dict[str, list[str]]:
-    """Return the names of the thing's pixels, by the way in which they are read."""
+    """Return the colour names of the object's pixels, by method of reading them."""
     pixels = own_pixels(rgba, rng)
     return {way: [color.name for color in named_colors(lab_from_srgb(each), False)] for way, each in pixels.items()}
 
 
 def own_pixels(rgba: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """Return some of the thing's pixels ``(N, 3)`` sRGB in 0..1, by the way in which they are read."""
+    """Return samples of the object's pixels ``(N, 3)`` as sRGB in 0..1, by method of reading them."""
     inside = cv2.erode((rgba[..., 3] > 127).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     pixels = rgba[inside][:, :3] / 255
     some = pixels[rng.choice(len(pixels), min(SAMPLES, len(pixels)), replace=False)]

@@ -1,12 +1,12 @@
-"""Build things from photos of templates, whose shape is known, as far as their size, and print how well they come out.
+"""Build objects from photos of templates, whose shape is known, up to their true size, and print the accuracy.
 
     python benchmarks/photo_generation.py OUT [--categories mug,bowl] [--seeds 1] [--held-out] [--nameless] [--docs]
 
-Photos are rendered (``template_photos``) at three elevations of the camera over plain and patterned ground, and go through the
-stages of a build from matting to true size, one process. OUT gets photos, meshes (GLB) and ``results.csv``. Seeds from 0 are
-for tuning; ``--held-out`` takes those from 1200. ``--nameless`` gives no name. ``--truth-matte`` gives the true outline, to see
-the shape by itself. ``shape_agreement`` says how meshes are compared. ``--docs``, beside the options that OUT was built with,
-builds nothing and writes docs/photo_benchmark.md from it.
+Photos are rendered (``template_photos``) at three camera elevations over plain and patterned grounds, and pass the stages of a
+build from matting to true size in one process. OUT receives photos, meshes (GLB) and ``results.csv``. Seeds from 0 are for
+tuning; ``--held-out`` uses those from 1200. ``--nameless`` gives no name. ``--truth-matte`` gives the true mask, to judge the
+shape alone. ``shape_agreement`` defines how meshes are compared. ``--docs``, with the options that OUT was built with, builds
+nothing and writes docs/photo_benchmark.md from it.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ from manitwin.pipeline.item import Item, twin_id
 from manitwin.pipeline.object_state import load_solid, object_name
 from manitwin.pipeline.recipe import stages_for
 
-HELD_OUT_FROM = 1200  # those before were looked at
+HELD_OUT_FROM = 1200  # lower seeds are used for tuning
 LAST_STAGE = "physical"
-OWN_STAGES = ("mesh", "views", "gate", "physical")  # what comes after the shape: not counted in its CPU-s
-# in steps of three through the list of templates: 42 of 127, of all groups
+OWN_STAGES = ("mesh", "views", "gate", "physical")  # stages after the shape, not counted in its CPU seconds
+# Every third template of the list: 42 of 127, from all groups.
 DEFAULT_EVERY = 3
 POOR_IOU = 0.6
 PAGE = Path(__file__).parent.parent / "docs" / "photo_benchmark.md"
@@ -49,7 +49,7 @@ PAGE = Path(__file__).parent.parent / "docs" / "photo_benchmark.md"
 
 @dataclass(frozen=True)
 class Result:
-    """One photo: what came of it. Shares and IoU are 0 to 1; None where nothing was built."""
+    """Result for one photo. Shares and IoU are 0 to 1, or None where nothing was built."""
 
     category: str
     seed: int
@@ -71,7 +71,7 @@ class Result:
 
 
 class KnownPhoto(Protocol):
-    """What is asked of a photo and of what it shows, as of ``TemplatePhoto``."""
+    """Interface of a photo with known truth, as ``TemplatePhoto`` has it."""
 
     @property
     def rgb(self) -> np.ndarray: ...
@@ -86,7 +86,7 @@ class KnownPhoto(Protocol):
 
 
 def build(photo: KnownPhoto, category: str, seed: int, path: Path, options: argparse.Namespace) -> Result:
-    """Write the photo, run the stages and compare."""
+    """Write the photo, run the stages and compare the result with the truth."""
     rgb = photo.rgb
     if options.truth_matte:
         rgb = np.dstack([rgb, np.where(photo.mask, 255, 0).astype(np.uint8)])
@@ -106,7 +106,7 @@ def build(photo: KnownPhoto, category: str, seed: int, path: Path, options: argp
                     break
         except (Rejected, InputError) as error:
             answer = error.reason, error.detail
-        except Exception as error:  # a defect: counted, and the others go on
+        except Exception as error:  # a defect is counted, and the other photos continue
             answer = "crash", f"{type(error).__name__}: {error}"
         told = _told(draft, category)
         mask_iou = _mask_iou(draft, photo.mask)
@@ -175,7 +175,7 @@ def _median(values: Iterable[float | None], digits: int = 2) -> str:
 
 
 def table(results: Sequence[Result], by: str) -> str:
-    """Return the rows as a Markdown table with even columns."""
+    """Return the rows as a Markdown table with aligned columns."""
     rows = [(by.removesuffix("_deg").replace("_", " "), *HEADER), *summary_rows(results, by)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = ["| " + " | ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) + " |" for row in rows]
@@ -210,17 +210,17 @@ def page(results: Sequence[Result], command: str) -> str:
 
 
 def poor(results: Sequence[Result]) -> list[str]:
-    """Return the categories with a photo that was accepted although its shape is poor, by IoU."""
+    """Return the categories with an accepted photo whose shape is poor, by IoU."""
     return sorted({r.category for r in results if r.filled_iou is not None and r.filled_iou < POOR_IOU})
 
 
 def families(results: Sequence[Result]) -> list[Result]:
-    """Return the results with all templates as one way to make a shape."""
+    """Return the results with all templates merged into one generator."""
     return [replace(r, primitive=r.primitive.split(":")[0]) for r in results]
 
 
 def summary_reasons(results: Sequence[Result]) -> list[tuple[str, int]]:
-    """Return how often each reason of rejection was given, most often first."""
+    """Return how often each reason of rejection occurred, most frequent first."""
     reasons = [f"`{r.reason}`" for r in results if not r.accepted]
     return sorted(((reason, reasons.count(reason)) for reason in set(reasons)), key=lambda pair: (-pair[1], pair[0]))
 
@@ -291,7 +291,7 @@ def main() -> None:
 
 
 def command_of(options: argparse.Namespace) -> str:
-    """Return the command that builds what ``options`` say, into a folder OUT."""
+    """Return the command that builds with ``options`` into a folder OUT."""
     words = ["python benchmarks/photo_generation.py OUT"]
     if options.categories:
         words.append(f"--categories {options.categories}")
@@ -302,13 +302,13 @@ def command_of(options: argparse.Namespace) -> str:
 
 
 def run(options: argparse.Namespace) -> list[Result]:
-    """Build all photos; prints a line each."""
+    """Build all photos, and print a line for each."""
     options.out.mkdir(parents=True, exist_ok=True)
     names = options.categories.split(",") if options.categories else list(load_templates())[:: options.every]
     first = HELD_OUT_FROM if options.held_out else 0
     results: list[Result] = []
     for category in names:
-        write_results(results, options.out / "results.csv")  # what is there when a person stops it
+        write_results(results, options.out / "results.csv")  # keeps the results if the run is interrupted
         for seed in range(first, first + options.seeds):
             for photo in photograph(category, seed, ELEVATIONS_DEG):
                 name = f"{category.replace(' ', '_')}-{seed}-{photo.elevation_deg:.0f}.png"

@@ -1,12 +1,11 @@
-"""Build things from one photo and from several of the same thing, whose shape is known, and print what the others add.
+"""Build objects from one photo and from several of the same object with known shape, and print the gain of further photos.
 
     python benchmarks/photo_views.py OUT [--categories mug,box] [--views 1,2,3,4] [--seeds 1] [--elevation 10] [--held-out]
 
-Each thing is photographed (``template_photos``) every 360 / N degrees about the vertical for N views above 2, at a right angle
-for 2. Each set goes through the stages of a build from matting to true size, with the turns stated and not. ``--nameless`` gives
-no name and asks no classifier, so that no template is fitted: what the outlines alone carve. ``--truth-matte`` gives the true
-outlines.
-OUT gets photos, meshes (GLB) and ``results.csv``.
+Each object is photographed (``template_photos``) every 360 / N degrees about the vertical for N > 2 views, and at a right angle
+for 2. Each set passes the stages of a build from matting to true size, once with stated turns and once without. ``--nameless``
+gives no name and uses no classifier, so that no template is fitted and the shape is the visual hull of the silhouettes.
+``--truth-matte`` gives the true masks. OUT receives photos, meshes (GLB) and ``results.csv``.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ RIGHT_DEG = 10.0
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a set of photos; shares and IoU are 0 to 1; ``turn_errors_deg`` those of the turns that were estimated."""
+    """Result for a set of photos; shares and IoU are 0 to 1; ``turn_errors_deg`` are the errors of estimated turns."""
 
     category: str
     seed: int
@@ -59,12 +58,12 @@ class Result:
 
 
 def turns_of(count: int) -> list[float]:
-    """Return the turns at which a thing is photographed from ``count`` sides."""
+    """Return the turns (degrees) at which an object is photographed for ``count`` views."""
     return [0.0, 90.0][:count] if count < 3 else [number * 360.0 / count for number in range(count)]
 
 
 def write_photo(photo: TemplatePhoto, path: Path, truth_matte: bool) -> None:
-    """Write a photo, with its true outline as alpha where that is asked for."""
+    """Write a photo, with its true mask as alpha if ``truth_matte`` is set."""
     rgb = np.dstack([photo.rgb, np.where(photo.mask, 255, 0).astype(np.uint8)]) if truth_matte else photo.rgb
     cv2.imwrite(str(path), cv2.cvtColor(rgb, cv2.COLOR_RGBA2BGRA if truth_matte else cv2.COLOR_RGB2BGR))
 
@@ -72,7 +71,7 @@ def write_photo(photo: TemplatePhoto, path: Path, truth_matte: bool) -> None:
 def build(
     category: str, seed: int, photos: Sequence[TemplatePhoto], paths: Sequence[Path], mode: str, named: bool
 ) -> Result:
-    """Run the stages on a set of photos and compare with the truth."""
+    """Run the stages on a set of photos and compare the result with the truth."""
     turns = turns_of(len(paths))
     files = [str(path.resolve()) for path in paths]
     item = Item(
@@ -113,14 +112,14 @@ def build(
 
 
 def _turn_errors(notes: dict[str, Any], truth: Sequence[float]) -> tuple[list[float], int]:
-    """Return the errors of the turns that the generator says, and how many it says."""
+    """Return the errors (degrees) of the turns that the generator states, and their number."""
     said = [view["turn_deg"] for view in notes.get("views", [])]
     known = [(turn, true) for turn, true in zip(said, truth, strict=False) if turn is not None][1:]
     return [abs((turn - true + 180) % 360 - 180) for turn, true in known], len(known)
 
 
 def summary(results: Sequence[Result]) -> list[str]:
-    """Return a Markdown table by the number of views and how their turns were known."""
+    """Return a Markdown table by number of views and by whether the turns were stated."""
     lines = [
         "| views | turns | sets | accepted | IoU | upright | unseen % | turns told | within 10 deg | CPU-s |",
         "|---|---|---|---|---|---|---|---|---|---|",

@@ -1,7 +1,7 @@
-"""Vary pictures of known masks while a network is trained: seen, coloured, labelled, lit and compressed in other ways each round.
+"""Augment pictures with known masks during training: geometry, colours, labels, light and compression, anew each epoch.
 
-Composites are made of templates, which have no labels and rarely the colour of their ground. A white bottle on a white sheet,
-whose label is all that stands out, is whole here too.
+Composites are made from templates, which have no labels and rarely the colour of their ground. The augmentation also covers cases
+such as a white bottle on a white sheet of which only the label stands out, with a mask of the whole bottle.
 """
 
 from __future__ import annotations
@@ -12,17 +12,19 @@ from typing import Any
 import torch
 from torch.nn import functional
 
-LOG_SCALE = (-0.8, 0.45)  # of what is seen of a picture: down to 0.45 of it, since the second look is as close
+LOG_SCALE = (-0.8, 0.45)  # of the visible part of a picture: down to 0.45, like the close-up of the second pass
 GROUND_COLOURED, DARKENED, LABELLED, PRINTED, COMPRESSED = 0.25, 0.12, 0.35, 0.35, 0.3
 SHADOWED, SHADED, BARE, ORDINARY, SOFT = 0.45, 0.2, 0.2, 0.35, 0.15
-"""Shares of pictures; of those that are ordinary none but the view and the light is varied."""
+"""Shares of pictures with each variation; for ordinary ones only the view and the light vary."""
 LABEL_BARS = 4
 SHADOW_STEPS = 5
 LUMA = (0.299, 0.587, 0.114)
 
 
 def varied(x: Any, truth: Any, side_px: int) -> tuple[Any, Any]:
-    """Return pictures (B, 3, H, W) in [0, 1] and their truth (B, 1, H, W) at the network's size, each varied in its own way."""
+    """Return augmented pictures ``(B, 3, H, W)`` in [0, 1] and masks ``(B, 1, H, W)`` at the network's size, each varied on its
+    own.
+    """
     x, truth = seen_anew(x, truth, side_px)
     y = labelled(darkened(coloured_as_ground(bared(x, truth), truth), truth), truth)
     y = shaded(shadowed(y, truth))
@@ -31,7 +33,7 @@ def varied(x: Any, truth: Any, side_px: int) -> tuple[Any, Any]:
 
 
 def seen_anew(x: Any, truth: Any, side_px: int) -> tuple[Any, Any]:
-    """Turn, scale, stretch, mirror and shift."""
+    """Rotate, scale, stretch, mirror and shift pictures and masks."""
     count, _, height, width = x.shape
     turn = torch.where(torch.rand(count) < 0.15, _drawn(count, -math.pi, math.pi), _drawn(count, -0.35, 0.35))
     scale, stretch = torch.exp(_drawn(count, *LOG_SCALE)), torch.exp(_drawn(count, -0.25, 0.25))
@@ -45,7 +47,7 @@ def seen_anew(x: Any, truth: Any, side_px: int) -> tuple[Any, Any]:
 
 
 def bared(x: Any, truth: Any) -> Any:
-    """Give some pictures a ground without texture: its mean colour, lit a little less to one side."""
+    """Replace the ground of some pictures by its mean colour without texture, slightly darker towards one side."""
     count, _, height, width = x.shape
     y, across = torch.meshgrid(torch.linspace(-1, 1, height), torch.linspace(-1, 1, width), indexing="ij")
     angle = _drawn(count, -math.pi, math.pi)
@@ -56,7 +58,7 @@ def bared(x: Any, truth: Any) -> Any:
 
 
 def coloured_as_ground(x: Any, truth: Any) -> Any:
-    """Give some things nearly the colour of the ground around them; their shading stays, some of their own colours too."""
+    """Give some things nearly the colour of the ground around them; the shading stays, and for some a part of the colour."""
     count = len(x)
     thing = functional.max_pool2d(truth, 4)
     around = functional.max_pool2d(thing, 11, 1, 5) - thing
@@ -72,7 +74,7 @@ def coloured_as_ground(x: Any, truth: Any) -> Any:
 
 
 def darkened(x: Any, truth: Any) -> Any:
-    """Make some things as dark as a deep shadow."""
+    """Make some things as dark as in a deep shadow."""
     count = len(x)
     mean = ((x.mean(1, keepdim=True) * truth).sum((2, 3)) / (truth.sum((2, 3)) + 1) + 0.02)[:, 0]
     gain = (_drawn(count, 0.02, 0.2) / mean).clamp(max=1)
@@ -80,8 +82,10 @@ def darkened(x: Any, truth: Any) -> Any:
 
 
 def shadowed(x: Any, truth: Any) -> Any:
-    """Let some things throw a shadow on the ground, hard or soft, deep or faint, along it or behind: their outline, sheared about
-    its foot or moved away in steps."""
+    """Add a cast shadow of some things to the ground: the silhouette, sheared about its foot or shifted in steps.
+
+    The shadow may be hard or soft, deep or faint, along the ground or on a wall behind.
+    """
     count, _, height, _ = x.shape
     rows = truth.amax((1, 3)) > 0.5
     foot = 2 * (height - 1 - rows.flip(1).float().argmax(1)) / height - 1
@@ -112,7 +116,7 @@ def shadowed(x: Any, truth: Any) -> Any:
 
 
 def shaded(x: Any) -> Any:
-    """Lay the edge of another thing's shadow across some pictures, over thing and ground."""
+    """Draw the edge of another object's shadow across some pictures, over thing and ground."""
     count, _, height, width = x.shape
     y, across = torch.meshgrid(torch.linspace(-1, 1, height), torch.linspace(-1, 1, width), indexing="ij")
     angle, soft = _drawn(count, -math.pi, math.pi), torch.exp(_drawn(count, -5, 0.5))
@@ -122,7 +126,7 @@ def shaded(x: Any) -> Any:
 
 
 def labelled(x: Any, truth: Any) -> Any:
-    """Print a patch with bars on some things, within their outline."""
+    """Print a patch with bars on some things, inside their silhouette."""
     count, _, height, width = x.shape
     y_px, x_px = torch.meshgrid(torch.arange(height).float(), torch.arange(width).float(), indexing="ij")
     inside = -functional.max_pool2d(-truth, 9, 1, 4)
@@ -148,7 +152,7 @@ def labelled(x: Any, truth: Any) -> Any:
 
 
 def lit_anew(x: Any, truth: Any) -> Any:
-    """Print other pictures on the thing, fainter ones on the ground; change light, hue, contrast; add noise and blur."""
+    """Blend other pictures into the thing and weakly into the ground; vary light, hue and contrast; add noise and blur."""
     count = len(x)
     other = x[torch.randperm(count)].flip(3)
     other = other / (other.mean((1, 2, 3), keepdim=True) + 0.05)
@@ -169,7 +173,7 @@ def lit_anew(x: Any, truth: Any) -> Any:
 
 
 def softened(x: Any) -> Any:
-    """Take some pictures out of focus."""
+    """Defocus some pictures."""
     side = (5, 7, 9)[int(torch.randint(3, (1,)))]
     soft = functional.avg_pool2d(
         functional.avg_pool2d(x, side, 1, side // 2, count_include_pad=False), 3, 1, 1, count_include_pad=False
@@ -178,7 +182,7 @@ def softened(x: Any) -> Any:
 
 
 def compressed(x: Any) -> Any:
-    """Smear the colours of some pictures over blocks, as JPEG does to small ones, and take half the resolution of their light."""
+    """Average the colours of some pictures over blocks, like JPEG of small pictures, and halve the resolution of luminance."""
     if torch.rand(1) > COMPRESSED:
         return x
     luma = sum(weight * x[:, channel : channel + 1] for channel, weight in enumerate(LUMA))
@@ -191,7 +195,7 @@ def compressed(x: Any) -> Any:
 
 
 def _beyond_a_line(truth: Any) -> Any:
-    """Return 1 on one side of a line through each thing (B, 1, H, W), 0 on the other; for two in five, 1 everywhere."""
+    """Return a mask ``(B, 1, H, W)``: 1 on one side of a line through each thing, 0 on the other; for two in five all 1."""
     count, _, height, width = truth.shape
     y, across = torch.meshgrid(torch.linspace(-1, 1, height), torch.linspace(-1, 1, width), indexing="ij")
     weight = truth[:, 0] / (truth.sum((1, 2, 3))[:, None, None] + 1)
@@ -206,7 +210,7 @@ def _beyond_a_line(truth: Any) -> Any:
 
 
 def _shading(x: Any, truth: Any) -> Any:
-    """Return how bright each pixel (B, 1, H, W) is, relative to the thing's mean."""
+    """Return the brightness ``(B, 1, H, W)`` of each pixel relative to the thing's mean."""
     grey = x.mean(1, keepdim=True)
     mean = (grey * truth).sum((2, 3), keepdim=True) / (truth.sum((2, 3), keepdim=True) + 1) + 0.02
     return (grey / mean).clamp(0.2, 2)

@@ -1,10 +1,11 @@
-"""Measure what a picture of an episode costs, by one state of the code and by another in turn.
+"""Measure the cost of rendering a picture of an episode, with two checkouts of the code in alternation.
 
     python benchmarks/pictures.py TWINS [--other CHECKOUT] [--rounds 3] [--states 40] [--cameras front] [--save FOLDER]
 
-A Panda that moves beside three twins of the data set TWINS, in pictures of 128 and 256 pixels, on one thread as in workers.
-CPU seconds a picture without the start (imports, shaders, the robot's looks), which is told by itself: a process a round, the two
-states in turn; least and median. ``--save``: the last picture of each camera and size, to be looked at.
+A moving Panda and three twins of the data set TWINS are rendered in pictures of 128 and 256 pixels, with one thread as in
+workers. Prints minimum and median CPU seconds per picture without the start-up cost (imports, shaders, the robot's meshes), which
+is printed separately. Each round is one process, alternating between the two checkouts. ``--save`` writes the last picture of
+each camera and size for inspection.
 """
 
 from __future__ import annotations

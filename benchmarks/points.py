@@ -1,11 +1,12 @@
-"""Score the points that ``rules`` chooses against the parts of templates, which are known by construction.
+"""Score the points chosen by ``rules`` against the parts of templates, which are known by construction.
 
     python benchmarks/points.py [--first SEED] [--seeds N] [--every K] [--held-out | --later] [--plain]
 
-The annotator gets the mesh and the category's name, 42 candidates of which all count as seen, and none of the known points. A
-point is right where its candidate lies where its label says, by the template's parts and frame (``known_places``). Labels that
-name no place of a thing are not judged, counted, and listed. The first 127 categories are split in halves by the CRC-32 of their
-names; ``--held-out`` scores the half by which nothing is set, ``--later`` the categories whose templates were made since.
+The annotator is given the mesh, the category's name and 42 candidates that all count as visible, but none of the known points. A
+point is right if its candidate lies where its label belongs, by the template's parts and frame (``known_places``). Labels that
+name no place of an object are not judged, but counted and listed. The first 127 categories are split in halves by the CRC-32 of
+their names. ``--held-out`` scores the half with which no parameter is set, ``--later`` the categories whose templates were added
+afterwards.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ MAX_OPENING_M = 0.08
 
 
 def main() -> None:
-    """Print the score, and what went wrong."""
+    """Print the score, and the wrong points."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seeds", type=int, default=5)
@@ -84,12 +85,14 @@ def main() -> None:
 
 
 def held_out(category: str) -> bool:
-    """Tell which half a category is in."""
+    """Tell whether a category is in the held-out half."""
     return crc32(category.encode()) % 2 == 1
 
 
 def verdicts(category: str, seed: int, plain: bool) -> list[tuple[str, str, bool | None, float | None]]:
-    """Return of each functional point its label, its candidate's part, whether that is right, and how far its feature is."""
+    """Return for each functional point its label, the part of its candidate, whether it is right, and the distance of its
+    feature.
+    """
     templates = load_templates()
     made = make(templates[category], read_text(category, templates), np.random.default_rng(seed))
     solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
@@ -124,7 +127,7 @@ def verdicts(category: str, seed: int, plain: bool) -> list[tuple[str, str, bool
 
 
 def away_m(made: Made, point: FunctionalPoint, center_of_mass_m: np.ndarray) -> float | None:
-    """Return how far (m) a point is from the known feature of its label, None where the template knows none of that name."""
+    """Return the distance (m) of a point from the known feature of its label, or None if the template has none."""
     features = [known for known in made.points if known.label == point.label and known.kind not in ("surface", "axis")]
     frames = [known_frame(made, known, center_of_mass_m) for known in features]
     place = np.array(point.position_m)[None]

@@ -1,9 +1,10 @@
-"""Print, for each robot, the share of verified grasps that it can reach where twins stand on an empty table.
+"""Print for each robot the share of verified grasps within its reach for twins on an empty table.
 
     python benchmarks/reach.py TWINS [--starts 2] [--robots panda ur5_panda ...]
 
-A grasp counts as reached where one of its two turns has a collision-free inverse kinematics and a straight approach. Own: grasps
-of the robot's own gripper; transferred: those of another one, with the fingertips where they were verified.
+A grasp counts as reachable if one of its two orientations has a collision-free inverse-kinematics solution and a straight
+approach. ``own`` are grasps of the robot's own gripper; ``transferred`` are those of another gripper, with the fingertips at the
+verified positions.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from manitwin.twin.loaded_twin import Twin, TwinSource
 
 
 def shares(robot_name: str, source: TwinSource, pool: Pool, starts: int) -> tuple[int, list[float], list[str], float]:
-    """Return how many grasps were looked at, each twin's reachable share, the twins without any, and CPU seconds."""
+    """Return the number of grasps checked, each twin's reachable share, the twins without any, and CPU seconds."""
     robot = load_robot(robot_name)
     planner, begun = PickPlacePlanner(robot), time.process_time()
     looked_at, found, without = 0, list[float](), list[str]()

@@ -1,11 +1,11 @@
-"""Damage real meshes in four ways, repair the copies, and print how many became solids and how far off they are.
+"""Damage real meshes in four ways, repair the copies, and print how many became solids and their error.
 
     python benchmarks/repair_damaged.py DATA [--only NAME ...] [--seed N]
 
-DATA holds manifest.csv and meshes/. Damage: holes (three patches of radius 2 % of the diagonal), flip (10 % of the
-faces reversed), soup (every triangle separate, 2 um of noise), skin (faces not seen from 48 views deleted), none.
-Errors are 95th percentiles of the distance from 12,000 surface points to the other mesh, the larger of both ways. Open
-cups and bowls made here, outer surface only, must keep their mouth.
+DATA holds manifest.csv and meshes/. The kinds of damage are: holes (three patches of radius 2 % of the diagonal), flip (10 % of
+the faces reversed), soup (all triangles separate, 2 um of noise), skin (faces not visible from 48 views deleted), and none.
+Errors are 95th percentiles of the distance from 12,000 surface points to the other mesh, the larger of both directions. Open cups
+and bowls generated here, outer surface only, must keep their opening.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ VIEWS = 48
 
 
 def load(path: Path) -> trimesh.Trimesh:
-    """Load a mesh file as one soup of triangles in the file's units."""
+    """Load a mesh file as one triangle soup in the file's units."""
     loaded = trimesh.load(path, process=False)
     mesh = loaded.to_geometry() if isinstance(loaded, trimesh.Scene) else loaded
     return trimesh.Trimesh(*weld_equal(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces)), process=False)
 
 
 def diagonal_m(mesh: trimesh.Trimesh) -> float:
-    """Return the diagonal of the axis-aligned box."""
+    """Return the diagonal of the axis-aligned box, metres."""
     return float(np.linalg.norm(mesh.extents))
 
 
 def holes(mesh: trimesh.Trimesh, rng: np.random.Generator) -> trimesh.Trimesh:
-    """Delete the faces whose centres lie within 2 % of the diagonal of three surface points."""
+    """Delete the faces with centres within 2 % of the diagonal of three surface points."""
     centers, _, _ = sample_surface(mesh, 3, rng)
     apart = np.linalg.norm(mesh.triangles_center[:, None] - centers[None], axis=-1)
     gone = (apart < 0.02 * diagonal_m(mesh)).any(1)
@@ -60,14 +60,14 @@ def flip(mesh: trimesh.Trimesh, rng: np.random.Generator) -> trimesh.Trimesh:
 
 
 def soup(mesh: trimesh.Trimesh, rng: np.random.Generator) -> trimesh.Trimesh:
-    """Separate all triangles and move every corner by noise of 2 um standard deviation."""
+    """Separate all triangles and displace every corner by noise of 2 um standard deviation."""
     corners = mesh.triangles.reshape(-1, 3)
     noisy = corners + rng.normal(0, 2e-6, corners.shape)
     return trimesh.Trimesh(noisy, np.arange(len(noisy)).reshape(-1, 3), process=False)
 
 
 def skin(mesh: trimesh.Trimesh, rng: np.random.Generator) -> trimesh.Trimesh:
-    """Delete the faces of which neither the middle nor a spot near a corner is seen from 48 places around."""
+    """Delete the faces of which neither the centre nor a point near a corner is visible from 48 viewpoints."""
     corners, middle = mesh.triangles, mesh.triangles_center
     spots = np.concatenate((middle[:, None], 0.8 * corners + 0.2 * middle[:, None]), axis=1)
     seen = np.zeros(len(corners), dtype=bool)
@@ -81,7 +81,7 @@ def skin(mesh: trimesh.Trimesh, rng: np.random.Generator) -> trimesh.Trimesh:
 
 
 def none(mesh: trimesh.Trimesh, rng: np.random.Generator) -> trimesh.Trimesh:
-    """Return the mesh as it is."""
+    """Return the mesh unchanged."""
     return mesh
 
 
@@ -91,7 +91,7 @@ DAMAGES: dict[str, Callable[[trimesh.Trimesh, np.random.Generator], trimesh.Trim
 
 
 def is_solid(result: RepairResult) -> bool:
-    """Tell whether trimesh and manifold3d both take the result as a solid."""
+    """Tell whether both trimesh and manifold3d accept the result as a solid."""
     mesh = result.mesh
     manifold = manifold3d.Manifold(
         manifold3d.Mesh64(
@@ -103,7 +103,7 @@ def is_solid(result: RepairResult) -> bool:
 
 
 def error_mm(original: trimesh.Trimesh, repaired: trimesh.Trimesh) -> tuple[float, float]:
-    """Return the 95th percentile and the maximum of the distance, the larger of both ways, in mm."""
+    """Return the 95th percentile and the maximum of the distance, the larger of both directions, in mm."""
     there = distance_to_surface(sample_surface(original, SAMPLES, np.random.default_rng(1))[0], repaired)
     back = distance_to_surface(sample_surface(repaired, SAMPLES, np.random.default_rng(2))[0], original)
     return (
@@ -115,7 +115,7 @@ def error_mm(original: trimesh.Trimesh, repaired: trimesh.Trimesh) -> tuple[floa
 def open_cup(
     radius_m: float, height_m: float, flare: float = 1.0, sections: int = 64, rings: int = 20
 ) -> trimesh.Trimesh:
-    """Make the outer surface of a cup: a disc and a wall, no inside, no lid; ``flare`` is top over bottom radius."""
+    """Make the outer surface of a cup: a disc and a wall, no inside, no lid; ``flare`` is the ratio of top to bottom radius."""
     angle = 2 * np.pi * np.arange(sections) / sections
     radii = np.concatenate((np.linspace(0.1, 1, 6) * radius_m, np.linspace(1, flare, rings + 1)[1:] * radius_m))
     heights = np.concatenate((np.zeros(6), np.linspace(0, height_m, rings + 1)[1:]))

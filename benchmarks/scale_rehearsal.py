@@ -1,11 +1,12 @@
-"""Rehearse a run of very many items: the real driver and the real ledger, workers that answer with recorded stage costs.
+"""Simulate a run of very many items: the real driver and ledger, with workers that return recorded stage costs.
 
     python benchmarks/scale_rehearsal.py DATASET [--items 1000000] [--cores 1024] [--curve CSV]
 
 ``DATASET`` has finished twins; each item takes the stages and the seconds of one of them, drawn at random. No stage runs and no
-folder is written: a simulated pool of ``--cores`` ends each job when its seconds are over, in a time of its own that also goes on
-by what the driver takes, so that a driver that is too slow leaves cores idle. Printed are the hours that the run would have
-taken, how busy its cores were, and what is real: the driver's CPU an item-stage, its memory over the run, the size of the ledger.
+folder is written. A simulated pool of ``--cores`` cores ends each job when its seconds are over. The simulated clock also
+advances by the time that the driver takes, so that a driver that is too slow leaves cores idle. Prints the hours that the run
+would have taken, the utilisation of its cores, and the measured figures: the driver's CPU per item and stage, its memory during
+the run, and the size of the ledger.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from manitwin.pipeline.stage_order import place_in_pipeline
 sys.path.insert(0, TESTS)
 from rehearsal_recipe import RehearsalRecipe
 
-SURVEY_S, FINISH_S = 0.02, 0.15  # an input is hashed; a folder is put together (measured on 8 meshes of 1 to 3 MB)
+SURVEY_S, FINISH_S = 0.02, 0.15  # hashing an input, assembling a folder (8 meshes of 1 to 3 MB)
 CURVE_POINTS = 20
 KEY = "0123456789abcdef01234567"
 
@@ -49,7 +50,7 @@ class Recorded:
 
 
 def recorded(data: Path) -> list[Recorded]:
-    """Read what the stages of all finished twins of a data set took."""
+    """Read the stage costs of all finished twins of a data set."""
     runs = [json.loads(path.read_text())["stages"] for path in sorted(data.glob("twins/*/*/run.json"))]
     return [Recorded({name: StageCost(**cost) for name, cost in run.items()}) for run in runs]
 
@@ -57,7 +58,8 @@ def recorded(data: Path) -> list[Recorded]:
 class RecordedPool:
     """An executor of simulated cores.
 
-    ``now_s`` is the time in the run: it goes on to the next end of a job, and by the seconds that the driver took since it asked.
+    ``now_s`` is the simulated time. It advances to the next end of a job, and by the seconds that the driver took since its last
+    call.
     """
 
     def __init__(self, runs: list[Recorded], cores: int):
@@ -71,7 +73,7 @@ class RecordedPool:
         return len(self._cores)
 
     def submit(self, ticket: int, job: Job) -> None:
-        """Give a job to the core that is free first."""
+        """Assign a job to the core that is free first."""
         seconds, reply = self._answer(job)
         end = max(self._cores[0], self.now_s) + seconds
         heapreplace(self._cores, end)
@@ -79,7 +81,7 @@ class RecordedPool:
         self.busy_s += seconds
 
     def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
-        """Return the jobs that have ended by now; where none has, wait for the next."""
+        """Return the jobs that have ended by now, or wait for the next one if none has."""
         self.now_s += time.perf_counter() - self._asked
         ended = []
         if self._ends:
@@ -91,11 +93,11 @@ class RecordedPool:
         return ended
 
     def parts(self) -> dict[int, StagePart]:
-        """Return nothing: no stage tells its parts."""
+        """Return nothing, because no stage reports its parts."""
         return {}
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing, because nothing is open."""
 
     def _answer(self, job: Job) -> tuple[float, Reply]:
         if isinstance(job, Survey):
@@ -108,7 +110,7 @@ class RecordedPool:
 
 
 def main() -> None:
-    """Run once and print."""
+    """Run once and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", type=Path)
     parser.add_argument("--items", type=int, default=1_000_000)
@@ -167,7 +169,7 @@ def _run(root: Path, arguments: argparse.Namespace) -> None:
 
 
 def size_mb(root: Path) -> float:
-    """Return the size of the ledger with its log."""
+    """Return the size of the ledger including its log, megabytes."""
     return sum(path.stat().st_size for path in root.glob("ledger.sqlite*")) / 1e6
 
 

@@ -1,10 +1,11 @@
-"""Build things from photos of scanned ones, whose shape is known and is that of no template, and print how well they come out.
+"""Build objects from photos of scanned objects, whose known shape is that of no template, and print the accuracy.
 
     python benchmarks/scanned_photos.py TWINS OUT [--own-matte]
 
-TWINS are accepted twins with names, of scans or models that nobody made for this (``manitwin build`` with a manifest of names).
-Each is photographed at three elevations and built from the photo under its name, as ``photo_generation`` does with templates,
-with the true outline, to see the shape by itself, or with its ``--own-matte``. OUT gets photos, meshes and ``results.csv``.
+TWINS are accepted twins with names, from scans or models that were not made for this project (``manitwin build`` with a manifest
+of names). Each is photographed at three elevations and built from the photo under its name, as ``photo_generation`` does with
+templates. The true mask is used, to judge the shape alone, or with ``--own-matte`` the mask of the matting stage. OUT receives
+photos, meshes and ``results.csv``.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ SEED = 1
 
 @dataclass(frozen=True)
 class ScannedPhoto:
-    """A photo with what is true of it, as ``TemplatePhoto``; ``truth`` is the thing's surface in its frame, metres."""
+    """A photo with its truth, like ``TemplatePhoto``; ``truth`` is the object's surface in its frame, metres."""
 
     rgb: np.ndarray
     mask: np.ndarray
@@ -36,7 +37,7 @@ class ScannedPhoto:
 
 
 def standing(parts: list[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
-    """Return the parts of a thing in its frame, raised or lowered so that its lowest point is at z = 0."""
+    """Return the parts of an object in its frame, shifted vertically so that the lowest point is at z = 0."""
     low_m = min(float(part.vertices[:, 2].min()) for part in parts)
     return [part.copy().apply_translation([0.0, 0.0, -low_m]) for part in parts]
 

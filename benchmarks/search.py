@@ -1,13 +1,13 @@
-"""Score search by picture: crops of drawn scenes against the data set that the scenes were sampled from.
+"""Score search by picture: crops of rendered scenes against the data set from which the scenes were sampled.
 
     python benchmarks/search.py DATASET SCENES... [--least-visible SHARE] [--grid]
 
-Each object of each picture of the scenes (``manitwin layout DATASET --pictures``) is a question, if at least ``--least-visible``
-of it and 150 pixels are seen: other lights, other grounds, other sides than those that were embedded. ``mask``: the crop is
-transparent where the object is not, as a segmenter gives it; ``box``: the rectangle around it with a twelfth of its longer side,
-whose background has to be told.
+Each object of each picture of the scenes (``manitwin layout DATASET --pictures``) is a query if at least ``--least-visible`` of
+it and 150 pixels are visible. Lights, grounds and viewpoints differ from those of the embedded views. ``mask``: the crop is
+transparent outside the object, as from a segmentation. ``box``: the rectangle around the object with a margin of a twelfth of its
+longer side, whose background must be recognised.
 
-``--grid`` scores other weights of colour as well: what is set by it is set on the tuning data set alone.
+``--grid`` also scores other weights of colour. Weights may be set with it on the tuning data set only.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ OCCLUDED = 0.9
 
 
 def crops(scenes: Path, least_visible: float) -> Iterator[tuple[str, float, np.ndarray, np.ndarray]]:
-    """Yield twin id, visible share, the crop with a mask as transparency, and the crop of the box."""
+    """Yield twin id, visible share, the crop with the mask as alpha, and the crop of the box."""
     for file in sorted(scenes.glob("scenes/*/*/scene.json")):
         truth = read_scene_truth(file)
         twins = {thing.name: thing.twin_id for thing in truth.record.objects}
@@ -51,14 +51,14 @@ def crops(scenes: Path, least_visible: float) -> Iterator[tuple[str, float, np.n
 
 
 def reweighted(looks: np.ndarray, weight: float) -> np.ndarray:
-    """Return looks in which colours count ``weight`` instead of what they are made with."""
+    """Return descriptors in which colours have the given weight instead of the default one."""
     factors = np.ones(looks.shape[-1], np.float32)
     factors[NETWORK:] = np.sqrt(weight / COLOR_WEIGHT)
     return np.asarray(looks * factors)
 
 
 def report(name: str, ranks: np.ndarray, visible: np.ndarray) -> None:
-    """Print how many are found first and among five, of all and of those that something hides."""
+    """Print how many are ranked first and among the first five, for all queries and for partly occluded ones."""
     hidden = visible < OCCLUDED
     line = f"{name:24} {len(ranks):4} first {np.mean(ranks == 0):6.1%} five {np.mean(ranks < 5):6.1%}"
     if hidden.any():

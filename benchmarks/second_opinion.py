@@ -1,9 +1,9 @@
-"""Try the verified grasps of finished twins in the second engine, and print by object how many hold there too.
+"""Try the verified grasps of finished twins in the second engine, and print for each object how many hold there too.
 
     python benchmarks/second_opinion.py DATASET [--grasps N] [--reference]
 
-``--grasps`` takes that many of each twin, drawn at random. With ``--reference`` what the second engine does not hold is tried in
-the first one at 1/960 s and 40 iterations as well: it says which of the two is nearer to a finer solution.
+``--grasps`` takes that many of each twin, drawn at random. With ``--reference`` grasps that fail in the second engine are also
+tried in the first one at 1/960 s and 40 iterations, to see which of the two is nearer to a finer solution.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ REFERENCE = replace(SETTINGS, timestep_s=1 / 960, solver_iterations=40, steps_pe
 
 
 def main() -> None:
-    """Print a line an object, then the sum and the worst."""
+    """Print a line per object, then the sum and the worst object."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("dataset", type=Path)
     parser.add_argument("--grasps", type=int, default=1000)
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def again(folder: Path, count: int, reference: bool) -> tuple[int, int]:
-    """Try the verified grasps of one twin; return how many hold, and of how many."""
+    """Try the verified grasps of one twin; return how many hold, and how many were tried."""
     twin = Twin(folder)
     body, poses = twin.rigid_body(), twin.grasps().gripper_to_object
     poses = poses[np.sort(np.random.default_rng(0).permutation(len(poses))[:count])]

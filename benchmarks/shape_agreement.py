@@ -1,10 +1,10 @@
-"""How well a mesh agrees with the true one, wherever it is put and however large it is made.
+"""Agreement of a mesh with the true one, independent of position, rotation and scale.
 
-Both meshes lie in object frames (Z up). What one photo can say is the shape up to a turn about the vertical and a scale, so the
-built mesh is aligned first, by rotation, translation and scale: of 36 turns about the vertical (``upright``) or of 24
-right-angled turns times 6 about the vertical (``free``), at equal volume, the best five by overlap are refined by closest
-points with scale (Besl and McKay 1992; Umeyama 1991), and the best of these by Nelder-Mead on the overlap itself. Overlap is
-counted over points drawn inside, in voxels of 1/88 of the longest side.
+Both meshes lie in object frames (Z up). One photo determines the shape up to a rotation about the vertical and a scale, so the
+built mesh is first aligned by rotation, translation and scale. The start orientations are 36 rotations about the vertical
+(``upright``) or 24 right-angled rotations times 6 about the vertical (``free``), at equal volume. The best five by overlap are
+refined by iterative closest points with scale (Besl and McKay 1992; Umeyama 1991), and the best of these by Nelder-Mead on the
+overlap itself. The overlap is counted over random interior points, in voxels of 1/88 of the longest side.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ REFINED = 5
 ROUNDS = 15
 SURFACE_POINTS = 3000
 BARRIER_POINTS = 200_000
-GOOD = 0.93  # what agrees so well upright is not turned over
+GOOD = 0.93  # upright agreement above which other orientations are not tried
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Overlap over union of the solids, and with hollows filled to the brim; chamfer distance over the longest side."""
+    """IoU of the solids, IoU with hollows filled to the brim, and chamfer distance over the longest side."""
 
     iou: float
     filled_iou: float
@@ -39,7 +39,7 @@ class Agreement:
 
 @dataclass(frozen=True)
 class Voxels:
-    """A solid as a grid ``(X, Y, Z)`` bool of cells of ``cell_m``, its first corner at ``origin_m``."""
+    """A solid as a grid ``(X, Y, Z)`` bool of cells of ``cell_m``, with its first corner at ``origin_m``."""
 
     grid: np.ndarray
     origin_m: np.ndarray
@@ -47,11 +47,11 @@ class Voxels:
 
     @property
     def volume_m3(self) -> float:
-        """The volume of the filled cells."""
+        """Volume of the filled cells."""
         return float(self.grid.sum()) * self.cell_m**3
 
     def holds(self, points_m: np.ndarray) -> np.ndarray:
-        """Tell which points ``(N, 3)`` lie inside."""
+        """Return which of the points ``(N, 3)`` lie inside."""
         index = np.floor((points_m - self.origin_m) / self.cell_m).astype(int)
         valid = ((index >= 0) & (index < self.grid.shape)).all(axis=1)
         inside = np.zeros(len(points_m), bool)
@@ -59,20 +59,20 @@ class Voxels:
         return inside
 
     def drawn(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Draw points ``(count, 3)`` inside."""
+        """Return random points ``(count, 3)`` inside."""
         cells = np.argwhere(self.grid)
         chosen = cells[rng.integers(len(cells), size=count)]
         return self.origin_m + (chosen + rng.random((count, 3))) * self.cell_m
 
 
 def voxelised(mesh: trimesh.Trimesh) -> Voxels:
-    """Return a closed mesh as voxels, by where lines along x enter and leave it."""
+    """Return a closed mesh as voxels, by the intersections of lines along x with its surface."""
     low, high = mesh.bounds
     cell = float((high - low).max()) / VOXELS
     shape = np.maximum(np.ceil((high - low) / cell).astype(int), 1) + 2
     origin = (low + high) / 2 - shape * cell / 2
     y, z = np.meshgrid(np.arange(shape[1]), np.arange(shape[2]), indexing="ij")
-    # off the middle by an odd share: a line through an edge of the mesh counts twice
+    # An irregular offset from the centre, because a line through an edge of the mesh would count twice.
     starts = np.column_stack([np.full(y.size, -1.0), y.ravel() + 0.5013, z.ravel() + 0.4987]) * cell + origin
     where, ray, _ = mesh.ray.intersects_location(starts, np.tile([1.0, 0, 0], (len(starts), 1)), multiple_hits=True)
     at = (where[:, 0] - origin[0]) / cell
@@ -84,7 +84,7 @@ def voxelised(mesh: trimesh.Trimesh) -> Voxels:
 
 
 def filled_to_the_brim(voxels: Voxels, mesh: trimesh.Trimesh) -> Voxels:
-    """Return the solid with all that stays in it when liquid is poured over it; walls thinner than a voxel hold too."""
+    """Return the solid with the volume that poured liquid would fill; walls thinner than a voxel hold too."""
     surface = trimesh.sample.sample_surface(mesh, BARRIER_POINTS, seed=0)[0]
     barrier = voxels.grid.copy()
     barrier[tuple(np.floor((surface - voxels.origin_m) / voxels.cell_m).astype(int).T)] = True
@@ -97,12 +97,12 @@ def filled_to_the_brim(voxels: Voxels, mesh: trimesh.Trimesh) -> Voxels:
         rim[0] = True
         grid[:, :, level] |= ~rim[labels[:, :, level]]
     if grid.sum() > voxels.grid.sum():
-        grid = ndimage.binary_closing(grid) | grid  # cells that a wall cuts, between it and the liquid
+        grid = ndimage.binary_closing(grid) | grid  # cells cut by a wall, between it and the liquid
     return Voxels(grid, voxels.origin_m, voxels.cell_m)
 
 
 def agreement(built: trimesh.Trimesh, truth: trimesh.Trimesh, seed: int = 0) -> Agreement:
-    """Align ``built`` with ``truth`` and compare; both closed, in object frames."""
+    """Align ``built`` with ``truth`` and compare them; both closed, in object frames."""
     rng = np.random.default_rng(seed)
     solids = voxelised(built), voxelised(truth)
     filled = filled_to_the_brim(solids[0], built), filled_to_the_brim(solids[1], truth)
@@ -122,14 +122,14 @@ def agreement(built: trimesh.Trimesh, truth: trimesh.Trimesh, seed: int = 0) -> 
 
 @dataclass(frozen=True)
 class Similarity:
-    """A map ``scale * rotation @ x + offset_m``."""
+    """The map ``scale * rotation @ x + offset_m``."""
 
     scale: float
     rotation: np.ndarray
     offset_m: np.ndarray
 
     def apply(self, points: np.ndarray) -> np.ndarray:
-        """Return where points ``(N, 3)`` go."""
+        """Return the transformed points ``(N, 3)``."""
         return np.asarray(self.scale * points @ self.rotation.T + self.offset_m)
 
 

@@ -1,10 +1,10 @@
-"""Build the meshes of a data folder by two states of the code at once, and print what each stage costs beside the other.
+"""Build the meshes of a data folder with two checkouts of the code at once, and print the costs of each stage side by side.
 
     python benchmarks/side_by_side.py OTHER DATA OUT [--only NAME,NAME] [--full] [--sample]
 
-``OTHER`` is a checkout of the state to compare with (``git worktree add OTHER COMMIT``); DATA as ``build_meshes.py`` has it. Both
-builds run at the same time, one process each, so that the machine treats them alike whatever else it does: their ratio is what
-counts. CPU seconds are those of the stages, as run.json keeps them; medians over the objects, and of their ratios.
+``OTHER`` is a checkout of the code to compare with (``git worktree add OTHER COMMIT``); DATA is as for ``build_meshes.py``. Both
+builds run at the same time, one process each, so that other load on the machine affects both alike; the ratio is what matters.
+CPU seconds are those of the stages from run.json. Printed are medians over the objects, and of their ratios.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ CHAIN = "whole chain"
 
 
 def main() -> None:
-    """Build with both and print."""
+    """Build with both checkouts and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("other", type=Path)
     parser.add_argument("data", type=Path)
@@ -42,7 +42,7 @@ def main() -> None:
     parser.add_argument("--sample", action="store_true", help="the second engine tries a sample here, and all there")
     arguments = parser.parse_args()
     manifest = write_manifest(arguments.data, arguments.out, "mesh", set(filter(None, arguments.only.split(","))))
-    environment = {"OMP_NUM_THREADS": "1", "LP_NUM_THREADS": "0"}  # as workers have it
+    environment = {"OMP_NUM_THREADS": "1", "LP_NUM_THREADS": "0"}  # as in workers
     running = []
     for name, checkout in (("other", arguments.other), ("this", HERE)):
         paths = {"PYTHONPATH": str(checkout / "src")}
@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def costs_of(data: Path) -> dict[str, dict[str, float]]:
-    """Return the CPU seconds of each stage of each twin, and its grasps, by the twin's id."""
+    """Return the CPU seconds of each stage of each twin, and its grasps, by twin id."""
     found = {}
     for path in sorted(data.glob("twins/*/*/run.json")):
         stages = {name: cost["cpu_seconds"] for name, cost in json.loads(path.read_text())["stages"].items()}

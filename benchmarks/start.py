@@ -1,10 +1,11 @@
-"""Measure what a command line costs before it does anything, by one state of the code and by another in turn.
+"""Measure the start-up cost of command lines, with two checkouts of the code in alternation.
 
     python benchmarks/start.py MESH [--other CHECKOUT] [--rounds 7] [--builds 3]
 
-``manitwin --help`` and a wrong option: CPU seconds of the whole process. A build of one mesh (``--quick``, one worker): CPU
-seconds of the command and all that it started, until its first stage begins and until that has ended. The rounds of the two
-states alternate, so that the machine treats them alike; least and median are printed.
+For ``manitwin --help`` and a wrong option the figure is the CPU seconds of the whole process. For a build of one mesh
+(``--quick``, one worker) it is the CPU seconds of the command and its child processes until the first stage begins, and until
+that stage has ended. The rounds alternate between the two checkouts, so that other load affects both alike. Minimum and median
+are printed.
 """
 
 from __future__ import annotations
@@ -53,13 +54,13 @@ def main() -> None:
 
 
 def print_row(name: str, took: dict[str, list[float]]) -> None:
-    """Print the least and the median of each state."""
+    """Print the minimum and the median for each checkout."""
     shown = (f"{state} {min(each):.3f} least {statistics.median(each):.3f} median" for state, each in took.items())
     print(f"{name:20s} CPU-s: {', '.join(shown)}", flush=True)
 
 
 def command(checkout: Path, line: list[str]) -> tuple[list[str], dict[str, str]]:
-    """Return a command line by a checkout's code, and its environment."""
+    """Return a command line that uses a checkout's code, and its environment."""
     return [sys.executable, "-m", "manitwin", *line], {
         **os.environ,
         "PYTHONPATH": str(checkout / "src"),
@@ -77,7 +78,7 @@ def whole_cpu_s(checkout: Path, line: list[str]) -> float:
 
 
 def first_stage_cpu_s(checkout: Path, mesh: Path) -> tuple[float, float]:
-    """Return the CPU seconds of a build until its first stage begins, and until it has ended, as its log tells of both."""
+    """Return the CPU seconds of a build until its first stage begins, and until it has ended, from the events of its log."""
     found: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
         log, out = Path(folder) / "log.txt", Path(folder) / "out"
@@ -101,12 +102,12 @@ def first_stage_cpu_s(checkout: Path, mesh: Path) -> tuple[float, float]:
 
 
 def session_cpu_s(session: int) -> float:
-    """Return the CPU seconds of all processes of a session, and of those that they have waited for."""
+    """Return the CPU seconds of all processes of a session, and of the child processes that they have waited for."""
     ticks = 0
     for place in Path("/proc").glob("[0-9]*/stat"):
         try:
             fields = place.read_text().rpartition(")")[2].split()
-        except OSError:  # it has ended
+        except OSError:  # the process has ended
             continue
         if int(fields[3]) == session:
             ticks += sum(map(int, fields[11:15]))

@@ -1,15 +1,15 @@
-"""Print how tasks of scenes do that are drawn evenly over kinds: executed, kept, and carried out again in their environments.
+"""Print the results of scene tasks drawn evenly over kinds: executed, kept, and replayed in their environments.
 
     python benchmarks/tasks.py SCENES OUT --count 500 --jobs 2
     python benchmarks/tasks.py SCENES OUT --plannable 16
 
-Tasks are made in all scenes (``OUT/tasks``, as ``manitwin tasks`` does), so many are drawn (``OUT/drawn``), of each kind in
-turn and a quarter of two literals, and executed once each (``OUT/episodes``). A task has been planned before it is one: all that
-are drawn are plannable, and what is not executed counts as not kept. With ``--replay`` each kept episode's actions are
-carried out by ``make_env``, which has to judge them a success, and the states have to be those recorded, to the bit. Run again
-with the same arguments it goes on where it ended.
+Tasks are made in all scenes (``OUT/tasks``, as ``manitwin tasks`` does). ``--count`` of them are drawn (``OUT/drawn``), from each
+kind in turn and a quarter with two literals, and executed once each (``OUT/episodes``). A task is only made if it could be
+planned, so all drawn ones are plannable, and one that is not executed counts as not kept. With ``--replay`` each kept episode's
+actions are executed in ``make_env``, which must judge them a success, and the states must equal those recorded bit for bit. A run
+with the same arguments continues where the last one ended.
 
-``--plannable``: instead, all candidates of one literal of so many scenes are checked, by as many processes as ``--jobs`` says.
+``--plannable`` instead checks all candidates with one literal of that many scenes, in ``--jobs`` processes.
 """
 
 from __future__ import annotations
@@ -50,13 +50,13 @@ from manitwin.scenes.scene_files import scene_ids, scene_name
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.shares import wilson_interval
 
-SPARE = 2.0  # so many times as many tasks are made as are drawn: rare kinds are not in every scene
+SPARE = 2.0  # factor of tasks made per task drawn: rare kinds are not in every scene
 TWO_LITERAL_SHARE = 0.25
 CONFIG = "config.json"
 
 
 def drawn_evenly(tasks: Sequence[TaskRecord], count: int, rng: np.random.Generator) -> list[TaskRecord]:
-    """Return so many tasks, of each kind in turn; a quarter has two literals, as far as there are such."""
+    """Return ``count`` tasks, of each kind in turn; a quarter has two literals, as far as there are such."""
     two = [task for task in tasks if len(task.steps) > 1]
     chosen = _in_turn(two, round(TWO_LITERAL_SHARE * count), rng)
     return chosen + _in_turn([task for task in tasks if len(task.steps) == 1], count - len(chosen), rng)
@@ -73,13 +73,13 @@ def _in_turn(tasks: Sequence[TaskRecord], count: int, rng: np.random.Generator) 
 
 
 def share(name: str, right: int, of: int, rest: str = "") -> str:
-    """Return a row with a share and its 95 % interval."""
+    """Return a row with a share and its 95 % confidence interval."""
     low, high = wilson_interval(right, of)
     return f"{name:28} {right:4} of {of:4} = {right / max(1, of):6.1%} ({low:.0%} to {high:.0%}) {rest}"
 
 
 def plannable_of(scenes: Path, robot_name: str, seed: int, scene_id: str) -> tuple[Counter[str], Counter[str]]:
-    """Return how many candidates of one literal a scene has of each kind, and how many of these can be planned."""
+    """Return how many candidates with one literal a scene has of each kind, and how many of these can be planned."""
     source, robot, settings = EpisodesSource.of(scenes, None), load_robot(robot_name), TasksConfig(seed=seed)
     twins, planner = TwinSource(source.dataset), planner_of(robot, settings.episode.timestep_s)
     loaded = Scene.read(scenes / scene_name(scene_id), source.dataset)
@@ -118,9 +118,10 @@ def print_plannable(scenes: Path, count: int, robot: str, seed: int, jobs: int) 
 
 
 def replayed(tasks: Path, episodes: Path, jobs: int) -> tuple[int, int, int]:
-    """Carry out the actions of every kept episode in its task's environment.
+    """Execute the actions of every kept episode in its task's environment.
 
-    Returns how many succeeded, in how many joints, hands and objects were where they had been, to the bit, and of how many.
+    Returns the number of successes, the number with joints, hands and objects equal to the recording bit for bit, and the number
+    of episodes.
     """
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         counts = list(pool.map(partial(replay_part, tasks, episodes, jobs), range(jobs)))
@@ -129,7 +130,7 @@ def replayed(tasks: Path, episodes: Path, jobs: int) -> tuple[int, int, int]:
 
 
 def replay_part(tasks: Path, episodes: Path, parts: int, part: int) -> tuple[int, int, int]:
-    """Carry out the actions of every so manieth kept episode; returns as ``replayed`` does."""
+    """Execute the actions of every ``parts``-th kept episode, from ``part`` on; returns the same as ``replayed``."""
     good = exact = count = 0
     for episode in islice(stored_episodes(batch_folders(episodes)), part, None, parts):
         recording, info = episode.recording, {"success": False}
@@ -155,7 +156,7 @@ def replay_part(tasks: Path, episodes: Path, parts: int, part: int) -> tuple[int
 
 
 def is_recorded(seen: Mapping[str, Any], recording: Recording, number: int) -> bool:
-    """Tell whether an observation has the recorded state, by its number, to the bit."""
+    """Tell whether an observation equals the recorded state with the given number bit for bit."""
     pairs = (
         (seen["object_poses"][:, :3], recording.object_positions_m[number]),
         (seen["joint_positions_rad"], recording.joint_positions_rad[number]),
@@ -165,7 +166,7 @@ def is_recorded(seen: Mapping[str, Any], recording: Recording, number: int) -> b
 
 
 def main() -> None:
-    """Make tasks, draw, execute, and print a row for each kind and one for all."""
+    """Make, draw and execute tasks, and print a row for each kind and one for all."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", type=Path)
     parser.add_argument("out", type=Path)

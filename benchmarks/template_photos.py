@@ -1,4 +1,4 @@
-"""Photos of things whose shape is known: templates rendered on a table, with light, shadow and noise, and their truth."""
+"""Photos of objects with known shape: templates rendered on a table, with light, shadow and noise, and their truth."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from manitwin.render.scene_renderer import SceneRenderer, ShadowRegion, Surround
 
 WIDTH_PX, HEIGHT_PX = 1024, 768
 ELEVATIONS_DEG = (10.0, 30.0, 55.0)
-FRONT_AZIMUTH_DEG = -90.0  # templates look towards -Y
-FOV_Y_DEG = (22.0, 42.0)  # 60 to 31 mm on a film of 24 mm
-PULLED_BACK = (1.25, 1.7)  # of the distance at which the thing fills the picture
-TURNED_DEG = 40.0  # people turn a thing so that its front shows, but rarely exactly
+FRONT_AZIMUTH_DEG = -90.0  # templates face -Y
+FOV_Y_DEG = (22.0, 42.0)  # 60 to 31 mm on a sensor 24 mm high
+PULLED_BACK = (1.25, 1.7)  # of the distance at which the object fills the picture
+TURNED_DEG = 40.0  # people turn an object so that its front is visible, but rarely exactly
 NOISE = 1.5  # grey values, of a phone in good light
 TABLE_EVERY = 4
 TABLE_TOP_M = 0.02
@@ -47,9 +47,9 @@ TABLES = ("wood", "cloth", "marble")
 
 @dataclass(frozen=True)
 class TemplatePhoto:
-    """A photo with what is true of it: ``rgb (H, W, 3) uint8``, ``mask (H, W) bool``, the thing, and where it was seen from.
+    """A photo with its truth: ``rgb (H, W, 3) uint8``, ``mask (H, W) bool``, the object and the camera's direction.
 
-    ``azimuth_deg`` is that of the camera in the thing's frame, 0 along +X, counter-clockwise; ``ground`` is a name.
+    ``azimuth_deg`` is that of the camera in the object's frame, 0 along +X, counter-clockwise; ``ground`` is a name.
     """
 
     rgb: np.ndarray
@@ -62,7 +62,7 @@ class TemplatePhoto:
 
     @property
     def truth(self) -> trimesh.Trimesh:
-        """The thing's closed mesh in its frame, metres."""
+        """Return the object's closed mesh in its frame, metres."""
         return trimesh.Trimesh(self.made.mesh.vertices, self.made.mesh.faces, process=False)
 
 
@@ -74,9 +74,9 @@ def photograph(
     turns_deg: Sequence[float] = (0.0,),
     wish: Wish | None = None,
 ) -> list[TemplatePhoto]:
-    """Photograph one thing of a category: each elevation from each turn about the vertical, all else drawn from the seed.
+    """Photograph one object of a category from each elevation and each turn about the vertical; the seed determines the rest.
 
-    ``wish`` is the colour or material of the whole thing; raises UsageError where it cannot be made so.
+    ``wish`` is the colour or material of the whole object; raises UsageError where it cannot be made so.
     """
     rng = np.random.default_rng([seed, *category.encode()])
     made = make(load_templates()[category], Wanted(category, {} if wish is None else {"": wish}), rng)
@@ -86,7 +86,7 @@ def photograph(
 
 @dataclass(frozen=True)
 class Shot:
-    """A photo of any thing: ``rgb (H, W, 3) uint8``, ``mask (H, W) bool``; ``seen_from`` elevation and azimuth, degrees."""
+    """A photo of any object: ``rgb (H, W, 3) uint8``, ``mask (H, W) bool``; ``seen_from`` is elevation and azimuth, degrees."""
 
     rgb: np.ndarray
     mask: np.ndarray
@@ -102,7 +102,7 @@ def photographed(
     *,
     turns_deg: Sequence[float] = (0.0,),
 ) -> list[Shot]:
-    """Photograph the visual parts of a thing that stands on z = 0 of its frame, whose front is towards -Y."""
+    """Photograph the visual parts of an object that stands on z = 0 of its frame with its front towards -Y."""
     points = np.concatenate([part.vertices for part in parts])
     drawn = max(1.0, LEAST_DRAWN_M / float(np.linalg.norm(np.ptp(points, axis=0))))
     size_m = drawn * float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -153,14 +153,14 @@ def _pulled_back(points: np.ndarray, azimuth_deg: float, elevation_deg: float, f
 
 
 def _scaled(camera: Camera, by: float) -> Camera:
-    """Return the camera of a scene that is so many times as large."""
+    """Return the camera for a scene scaled by a factor."""
     pose = camera.camera_to_object.copy()
     pose[:3, 3] *= by
     return Camera(pose, camera.fov_y_rad, camera.width_px, camera.height_px)
 
 
 def _lighting(rng: np.random.Generator, camera_azimuth_deg: float) -> Lighting:
-    """Return a window's light from one side above, and the room's."""
+    """Return the light of a window on one side above, and of the room."""
     side = np.deg2rad(camera_azimuth_deg + rng.choice([-1, 1]) * rng.uniform(25, 75))
     height = rng.uniform(0.9, 1.8)
     toward = np.array([-np.cos(side), -np.sin(side), -height])
@@ -170,7 +170,7 @@ def _lighting(rng: np.random.Generator, camera_azimuth_deg: float) -> Lighting:
 
 
 def _exposed(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return the picture as a lens and a sensor give it: a little soft, a little noisy."""
+    """Return the picture with a slight lens blur and sensor noise."""
     soft = cv2.GaussianBlur(rgb.astype(np.float32), (0, 0), 0.7)
     noise = rng.normal(0, NOISE, rgb.shape).astype(np.float32)
     return np.clip(np.rint(soft + noise), 0, 255).astype(np.uint8)

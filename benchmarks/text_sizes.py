@@ -1,9 +1,10 @@
-"""Make every template with several stated sides, and every vessel with a stated volume, and print how many can have them.
+"""Make every template with several stated sides, and every vessel with a stated volume, and print how many succeed.
 
     python benchmarks/text_sizes.py [--seed 5] [--volume "400 ml"]
 
-The sides are those of another thing of the category, all larger or smaller by 12 % at most, in a text: 'a mug 12.01 cm long and
-9.40 cm tall', 'a book, 21.30 x 14.50 x 2.80 cm'. What cannot be made is refused; of what is made the worst side is told.
+The sides are those of another object of the category, all scaled by at most 12 %, in a text: 'a mug 12.01 cm long and 9.40 cm
+tall', 'a book, 21.30 x 14.50 x 2.80 cm'. Texts that cannot be made are refused; for the others the largest error of a side is
+printed.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ OTHER_SEED, MOST_LARGER = 77, 0.12
 
 
 def main() -> None:
-    """Make and print."""
+    """Make the templates and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=5)
     parser.add_argument("--volume", default="400 ml")

@@ -1,9 +1,9 @@
-"""Build a twin of a text for categories of all six groups, and count how many are verified.
+"""Build a twin from a text for categories of all six groups, and count how many are verified.
 
     python benchmarks/texts.py DATASET [--categories N] [--count K] [--thorough]
 
-The categories are spread evenly over each group's alphabet. A data set that is there is gone on with, so that a run may be
-stopped at any time. Without ``--thorough`` one engine tries each grasp once (``build --quick``).
+The categories are spread evenly over each group's alphabetical order. An existing data set is continued, so a run may be stopped
+at any time. Without ``--thorough`` one engine tries each grasp once (``build --quick``).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from manitwin.models.generators.templates.catalog import load_templates
 
 
 def main() -> None:
-    """Build, and print what was accepted by group, what was rejected, and the CPU-seconds of a twin."""
+    """Build, and print what was accepted by group, what was rejected, and the CPU seconds per twin."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("dataset", type=Path)
     parser.add_argument("--categories", type=int, default=60)
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def chosen(categories: int) -> dict[str, list[str]]:
-    """Return as many categories of each group, of those with fewer all."""
+    """Return the chosen categories of each group: ``categories`` of each, or all of a smaller group."""
     templates = load_templates()
     groups: dict[str, list[str]] = defaultdict(list)
     for category in sorted(templates):
@@ -61,7 +61,7 @@ def text(category: str) -> str:
 
 
 def cpu_seconds(folder: Path) -> float:
-    """Return what the stages of a twin took."""
+    """Return the CPU seconds of a twin's stages."""
     stages = json.loads((folder / "run.json").read_text(encoding="utf-8"))["stages"]
     return float(sum(cost["cpu_seconds"] for cost in stages.values()))
 

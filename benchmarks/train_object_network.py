@@ -1,18 +1,19 @@
-"""Train the decoder of the built-in object network on composites (``composites.py``, the part for training).
+"""Train the decoder of the built-in object network on composites (``composites.py``, the training part).
 
     python benchmarks/train_object_network.py encoder encoder.npz
     python benchmarks/train_object_network.py draw PICTURES [--count 2500] [--first 0]
     python benchmarks/train_object_network.py train encoder.npz PICTURES... -o decoder.npz [--minutes 60] [--begin F]
 
-``decoder.npz`` becomes one of those in src/manitwin/models/matting. ``object_network.npz`` learned from pictures that were
-turned, scaled, printed on and lit anew; ``object_network_varied.npz`` went on from it (``--begin``, 160 minutes in four runs,
-each of another ``--seed``) with all of ``picture_variations.py``: things and parts of them in their ground's colour, dark ones,
-labels, hard shadows, smeared colours, bare grounds, and in the last run a third of ordinary pictures and some out of focus.
-``encoder`` and ``draw`` want this package; ``train`` wants PyTorch 2 and NumPy and nothing else, so it can run in an
-environment of its own. The encoder, EfficientNet-Lite0, is taken as it is: it knows real photos, which made ones cannot teach.
-The pictures are of other seeds than those of every other part, show none of the held-out grounds and none of a quarter of the
-categories. Batches follow from the seed, but arithmetic is bfloat16 where the processor has it and the learning rate follows
-the clock: weights differ a little each time; ``matting.py`` judges them.
+``decoder.npz`` becomes one of the networks in src/manitwin/models/matting. ``object_network.npz`` was trained on rotated, scaled,
+printed and relit pictures. ``object_network_varied.npz`` continued from it (``--begin``, 160 minutes in four runs with different
+``--seed``) with all of ``picture_variations.py``: objects and parts in the colour of their ground, dark objects, labels, hard
+shadows, smeared colours, bare grounds, and in the last run a third of ordinary pictures and some out of focus.
+
+``encoder`` and ``draw`` need this package; ``train`` needs only PyTorch 2 and NumPy, so it can run in a separate environment. The
+encoder, EfficientNet-Lite0, is used unchanged, because it was trained on real photos. The pictures have other seeds than those of
+every other part, and contain no held-out ground and none of a quarter of the categories. Batches follow from the seed, but the
+arithmetic is bfloat16 where the processor supports it and the learning rate depends on elapsed time, so the weights differ
+slightly between runs; ``matting.py`` evaluates them.
 """
 
 from __future__ import annotations
@@ -25,16 +26,16 @@ from typing import Any
 
 import numpy as np
 
-WIDTH_PX, HEIGHT_PX = 400, 320  # of what is drawn: more than the network sees, for views that are scaled up
+WIDTH_PX, HEIGHT_PX = 400, 320  # of drawn pictures: larger than the network's input, for views that are scaled up
 SIDE_PX = 288
 BLOCKS = ((1, 3, 1, 1), (2, 3, 2, 6), (2, 5, 2, 6), (3, 3, 2, 6), (3, 5, 1, 6), (4, 5, 2, 6), (1, 3, 1, 6))
-"""Of the encoder: repeats, kernel, stride of the first, expansion."""
+"""Blocks of the encoder: repeats, kernel, stride of the first, expansion."""
 SEEN = {0: 16, 2: 24, 4: 40, 10: 112, 15: 320}
-"""Blocks whose values the decoder takes, with their channels."""
+"""Blocks whose output the decoder uses, with their channels."""
 CHANNELS, MIXES = (24, 32, 48, 64, 96), 2
 MEAN, DEVIATION = 127.0, 128.0
 BATCH, RATE = 16, 3e-3
-RATE_ON = 8e-4  # of a decoder that has begun
+RATE_ON = 8e-4  # learning rate of a decoder that continues training
 
 
 def draw(folder: Path, first: int, count: int) -> None:
@@ -55,7 +56,7 @@ def draw(folder: Path, first: int, count: int) -> None:
 
 
 def encoder(weights: dict[str, np.ndarray]) -> Any:
-    """Return the function from pictures (B, 3, H, W), as the encoder wants them, to the values of the ``SEEN`` blocks."""
+    """Return the function from normalised pictures (B, 3, H, W) to the outputs of the ``SEEN`` blocks."""
     import torch
     from torch.nn import functional
 
@@ -64,7 +65,7 @@ def encoder(weights: dict[str, np.ndarray]) -> Any:
         kernel = torch.from_numpy((weights[f"{name}.weight"] * gain[:, None, None, None]).astype(np.float32))
         bias = torch.from_numpy((weights[f"{norm}.bias"] - weights[f"{norm}.running_mean"] * gain).astype(np.float32))
         side, size = x.shape[-1], kernel.shape[-1]
-        total = max((-(-side // stride) - 1) * stride + size - side, 0)  # TensorFlow's SAME
+        total = max((-(-side // stride) - 1) * stride + size - side, 0)  # TensorFlow's SAME padding
         x = functional.pad(x, (total // 2, total - total // 2) * 2)
         groups = len(kernel) if kernel.shape[1] == 1 else 1
         y = functional.conv2d(x, kernel, bias, stride, groups=groups)
@@ -94,7 +95,7 @@ def encoder(weights: dict[str, np.ndarray]) -> Any:
 
 
 def decoder() -> Any:
-    """Return the decoder, untrained: a feature pyramid from a 32nd of the picture's size to half, four pixels at a time."""
+    """Return the untrained decoder: a feature pyramid from 1/32 to 1/2 of the picture's size, four pixels at a time."""
     import torch
     from torch import nn
     from torch.nn import functional
@@ -139,7 +140,7 @@ def decoder() -> Any:
 
 
 def loss_of(answer: Any, truth: Any) -> Any:
-    """Return the cross-entropy, three times as heavy along outlines, and one less the soft IoU (Rahman and Wang 2016)."""
+    """Return the cross-entropy, weighted threefold along contours, plus one minus the soft IoU (Rahman and Wang 2016)."""
     import torch
     from torch.nn import functional
 
@@ -154,9 +155,9 @@ def loss_of(answer: Any, truth: Any) -> Any:
 def train(
     weights: Path, folders: list[Path], minutes: float, threads: int, begin: Path | None, seed: int
 ) -> dict[str, np.ndarray]:
-    """Train for so many minutes, on from the weights ``begin`` where they are given, whose normalisation stays as it is.
+    """Train for the given minutes, continuing from the weights ``begin`` if given, whose normalisation stays fixed.
 
-    Returns the weights, batch normalisation folded in, as float16.
+    Returns the weights as float16, with batch normalisation folded in.
     """
     import torch
     from picture_variations import varied
@@ -207,7 +208,7 @@ def train(
 
 
 def folded(state: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the weights by the names of ``manitwin.models.matting.object_network``, batch normalisation folded in."""
+    """Return the weights by the names of ``manitwin.models.matting.object_network``, with batch normalisation folded in."""
     weights: dict[str, np.ndarray] = {}
     for name, value in state.items():
         layer, _, kind = name.rpartition(".")
@@ -222,7 +223,7 @@ def folded(state: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def unfolded(weights: dict[str, np.ndarray], state: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the ``state`` of an untrained decoder with these weights in it, its normalisation doing nothing but add biases."""
+    """Return the ``state`` of an untrained decoder with these weights, its normalisation reduced to adding biases."""
     state = {name: value.copy() for name, value in state.items()}
     for name in state:
         layer, _, kind = name.rpartition(".")

@@ -1,14 +1,15 @@
-"""Train the network that draws outlines (``manitwin.models.matting.outline_network``) on composites of the part for training.
+"""Train the network that refines contours (``manitwin.models.matting.outline_network``) on composites of the training part.
 
     python benchmarks/train_outline_network.py draw FOUND.npz [--first 70000] [--count 250] [--jobs 2]
     python benchmarks/train_outline_network.py draw BENT.npz --bent-only --first 62000 --count 800
     python benchmarks/train_outline_network.py train FOUND.npz BENT.npz -o outline_network.npz
 
-``outline_network.npz`` lies in src/manitwin/models/matting. ``draw`` wants this package, ``train`` scikit-learn besides (1.9 was
-used), whose perceptron it fits; what every twentieth picture says is left out and printed. A picture is seen with the masks that
-the rules and the object network find in it, and, at another size and sometimes sharpened, with its truth at up to half the
-size, bent and swollen by up to some pixels; with ``--bent-only``, which takes a fifth of the time, only so. The pictures with
-which the weights in the package were made had other random numbers in their second part: drawn again, they differ a little.
+``outline_network.npz`` lies in src/manitwin/models/matting. ``draw`` needs this package; ``train`` also needs scikit-learn (1.9
+was used), whose multilayer perceptron it fits. Every twentieth picture is left out for validation, and the result on these is
+printed. A picture is used with the masks that the rules and the object network find in it. It is used again at another size,
+sometimes sharpened, with its true mask at up to half the size, deformed and dilated by some pixels. With ``--bent-only``, which
+takes a fifth of the time, only the second is done. The shipped weights were trained with other random numbers in the second part,
+so drawing the pictures again gives slightly different ones.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from manitwin.models.matting.study import judged_candidates, largest_piece
 
 VARIANTS: tuple[Variant, ...] = ("plain", "plain", "labelled", "matched")
 PATCHES_OF_A_MASK = 600
-LEAST_IOU = 0.6  # a mask that is of something else teaches no outline
+LEAST_IOU = 0.6  # a mask of something else teaches no contour
 LEAST_PIXELS = 60
 SIZES = (0.6, 1.7)
 ROUGHER = (1.0, 1.25, 1.5, 2.0)
@@ -49,7 +50,7 @@ HELD_OUT_EVERY = 20
 
 
 def drawn_patches(number: int, bent_only: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Make one composite; return patches (N, F) float16 near the outlines of masks of it, and whether each is object (N,)."""
+    """Make one composite; return patches (N, F) float16 near its masks' contours, and whether each is object (N,)."""
     cv2.setNumThreads(1)
     rng = np.random.default_rng([number, 77])
     picture = composite("training", number, VARIANTS[number % len(VARIANTS)])
@@ -76,7 +77,10 @@ def _length() -> int:
 def _near_outline(
     rng: np.random.Generator, rgb: np.ndarray, truth: np.ndarray, mask: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return patches near the outline of a mask, turned and mirrored alike, and the truth at each; none of next to nothing."""
+    """Return patches near the contour of a mask, in one random rotation and mirroring, and the truth at each.
+
+    Returns nothing for a mask of fewer than ``LEAST_PIXELS``.
+    """
     if mask.sum() < LEAST_PIXELS:
         return []
     rough = cv2.resize(mask.astype(np.float32), truth.shape[::-1], interpolation=cv2.INTER_LINEAR)
@@ -119,7 +123,7 @@ def _resized(mask: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _bent(rng: np.random.Generator, mask: np.ndarray, by_px: float) -> np.ndarray:
-    """Return a mask whose outline is off by about ``by_px`` in a smooth way."""
+    """Return a mask whose contour is displaced smoothly by about ``by_px`` pixels."""
     height, width = mask.shape
     waves_px = float(rng.uniform(3, 14))
 
@@ -134,7 +138,7 @@ def _bent(rng: np.random.Generator, mask: np.ndarray, by_px: float) -> np.ndarra
 
 
 def train(files: list[Path], out: Path) -> None:
-    """Fit the perceptron; print accuracy and loss on the pictures that were left out."""
+    """Fit the perceptron; print accuracy and loss on the left-out pictures."""
     from sklearn.neural_network import MLPClassifier
 
     learned, held = [], []
@@ -172,7 +176,7 @@ def _agree(found: np.ndarray, truth: np.ndarray) -> str:
 
 
 def main() -> None:
-    """Draw or train."""
+    """Draw patches or train."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(dest="command", required=True)
     drawing = commands.add_parser("draw")

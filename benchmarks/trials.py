@@ -1,13 +1,14 @@
-"""Measure the grasp trials over finished twins: what they cost, where the time goes, and whether cheap verdicts are right.
+"""Measure the grasp trials of finished twins: their cost, where the time is spent, and the accuracy of cheap verdicts.
 
     python benchmarks/trials.py TWINS [--grasps N] [--reference N] [--processes N]
 
-``TWINS`` is a folder of finished twins. All ratios are of CPU seconds measured in this one run:
-- against one scene a grasp with all hulls, all slides and no early exit;
+``TWINS`` is a folder of finished twins. All ratios are of CPU seconds measured in the same run:
+
+- against one scene per grasp with all hulls, all slides and no early exit;
 - against the time inside the physics steps alone;
-- ``--reference N`` jittered and plain grasps a twin are tried at 1/960 s and 40 iterations, and verdicts compared, and those of
-  the reference itself with the hand 20 um beside;
-- ``--processes`` runs the same trials in several processes and compares wall seconds with one.
+- with ``--reference N``, that many jittered and plain grasps of each twin are tried at 1/960 s and 40 iterations and the verdicts
+  are compared, as are those of the reference itself with the hand moved by 20 um;
+- ``--processes`` runs the same trials in several processes and compares the wall seconds with those of one.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ NO_LIMITS = {
 
 
 def main() -> None:
-    """Run all twins and print a line each, then the medians."""
+    """Run all twins and print a line for each, then the medians."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("twins", type=Path)
     parser.add_argument("--grasps", type=int, default=100)
@@ -56,7 +57,7 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=0)
     arguments = parser.parse_args()
     folders = sorted(path.parent for path in arguments.twins.glob("twins/*/*/grasps.parquet"))
-    _one((folders[0], 2))  # imports and first uses are not what is measured
+    _one((folders[0], 2))  # imports and first calls are not measured
     rows = [_measure(folder, arguments.grasps) for folder in folders]
     for name in ("cpu_s", "around_s", "of_steps", "of_plain"):
         values = [row[name] for row in rows]
@@ -68,10 +69,10 @@ def main() -> None:
 
 
 def _measure(folder: Path, count: int) -> dict[str, float]:
-    """Return CPU seconds for 100 grasps, those around the steps, and the ratios to steps alone and to plain trials.
+    """Return CPU seconds for 100 grasps, those outside the steps, and the ratios to steps alone and to plain trials.
 
-    The machine's speed varies from second to second, so the three are measured in turns, grasp by grasp. A clock that
-    is read at every step slows down what is around the steps, so the total is that of a run without it.
+    The machine's speed varies over time, so the three are measured in alternation, grasp by grasp. Reading a clock at every step
+    slows down the code around the steps, so the total is that of a run without it.
     """
     twin = Twin(folder)
     body, poses = twin.rigid_body(), twin.grasps(verified_only=False).gripper_to_object[:count]
@@ -82,7 +83,7 @@ def _measure(folder: Path, count: int) -> dict[str, float]:
         total += _cpu_of_trials(as_run, body, pose[None], _settings())
         with _timed_steps() as spent:
             _cpu_of_trials(with_clock, body, pose[None], _settings())
-        steps += spent[0] - spent[1] * reading_s  # reading the clock is once inside what it measures
+        steps += spent[0] - spent[1] * reading_s  # each measurement includes one clock reading
         with _plain_trials():
             plain += _cpu_of_trials(SapienTrial(), body, pose[None], replace(_settings(), **NO_LIMITS))
     scale = 100 / len(poses)
@@ -117,7 +118,7 @@ def _cpu_of_trials(trial: SapienTrial, body: RigidBody, poses: np.ndarray, setti
 
 @contextmanager
 def _timed_steps() -> Iterator[list[float]]:
-    """Yield a list of the CPU seconds inside the physics steps, and their number."""
+    """Yield a list of the CPU seconds inside the physics steps, and the number of steps."""
     spent, plain = [0.0, 0.0], hand_scene.HandScene.advance
 
     class Timed:
@@ -146,7 +147,7 @@ def _timed_steps() -> Iterator[list[float]]:
 
 @contextmanager
 def _plain_trials() -> Iterator[None]:
-    """Keep all hulls, close for the whole time, lift all the way and repeat all slides."""
+    """Keep all hulls, close for the full time, lift all the way and repeat all slides."""
     margin, share, rest = sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE, trial_phases.CLOSED_SPEED_M_S
     sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE, trial_phases.CLOSED_SPEED_M_S = 10.0, 0.0, 0.0
     brief = trial_phases.REST_M, trial_phases.TURNED_RAD
@@ -159,7 +160,9 @@ def _plain_trials() -> Iterator[None]:
 
 
 def _compare(folders: list[Path], count: int) -> None:
-    """Print how often the verdicts are those of the reference: of plain trials at today's step, and as they are run."""
+    """Print how often the verdicts agree with the reference: for plain trials at the current step, and for trials as they are
+    run.
+    """
     verdicts: dict[str, list[bool]] = {"reference": [], "reference, 20 um beside": [], "plain": [], "as run": []}
     is_jittered: list[bool] = []
     for folder in folders:
@@ -200,12 +203,12 @@ def _one(job: tuple[Path, int]) -> float:
 
 
 def _scale(folders: list[Path], count: int, processes: int) -> None:
-    """Print how much faster several processes are: wall seconds of the same trials, one object a job."""
+    """Print the speed-up by several processes: wall seconds of the same trials, one object per job."""
     jobs, wall = [(folder, count) for folder in folders], {}
     context = multiprocessing.get_context("spawn")
     for number in (1, processes):
         with context.Pool(number) as pool:
-            pool.map(_one, [(folders[0], 1)] * number, chunksize=1)  # imports are not what is measured
+            pool.map(_one, [(folders[0], 1)] * number, chunksize=1)  # imports are not measured
             started = time.perf_counter()
             pool.map(_one, jobs, chunksize=1)
             wall[number] = time.perf_counter() - started

@@ -1,4 +1,4 @@
-"""What benchmarks of skills share: one robot with the twins of one data set, and where these may begin."""
+"""Common parts of the skill benchmarks: one robot with the twins of one data set, and their start poses."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class TwinBench:
     """A robot and the twins of a data set."""
 
     def __init__(self, dataset: str, robot: str):
-        """Read the pool."""
+        """Read the pool of twins."""
         self.pool, self.source, self.robot = pool_of(dataset), TwinSource(dataset), load_robot(robot)
 
     def begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
-        """Return the placements that a target may begin in with a skill, as far as its grasps and the table tell."""
+        """Return the placements from which a target may start with a skill, as far as its grasps and the table determine."""
         return begins_that_lead_there(
             skill,
             target,
@@ -34,5 +34,5 @@ class TwinBench:
         )
 
     def placeable(self, twin: PoolTwin) -> Placeable:
-        """Return how a twin may be put on a table."""
+        """Return how a twin may be placed on a table."""
         return Placeable.of(self.pool, twin)

@@ -1,9 +1,9 @@
-"""Make many inputs of few: every mesh and photo of a data folder, repeated with small seeded variations.
+"""Make many inputs from few: every mesh and photo of a data folder, repeated with small seeded variations.
 
     python benchmarks/vary.py DATA OUT [--count 500] [--seed 0]
 
-Meshes are scaled by 0.92 to 1.08 and by 3 % more or less along each axis, and turned about the vertical; photos are scaled by
-0.85 to 1, mirrored or not, and brightened by 6 % at most. The first of each is the original. Writes OUT/items.csv.
+Meshes are scaled by 0.92 to 1.08, by a further 3 % at most along each axis, and rotated about the vertical. Photos are scaled by
+0.85 to 1, mirrored or not, and brightened by at most 6 %. The first of each is the original. Writes OUT/items.csv.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def main() -> None:
         rows = [row for row in csv.DictReader(stream) if row["kind"] in ("mesh", "photo")]
     arguments.out.mkdir(parents=True, exist_ok=True)
     items = []
-    for source, row in enumerate(rows):  # source by source: each mesh is read once
+    for source, row in enumerate(rows):  # source by source, so that each mesh is read once
         for number in range(source, arguments.count, len(rows)):
             rng = np.random.default_rng([arguments.seed, number])
             file = vary(arguments.data / row["file"], row["kind"], arguments.out, number, number < len(rows), rng)
@@ -73,7 +73,7 @@ def vary(path: Path, kind: str, out: Path, number: int, original: bool, rng: np.
 
 
 def varied_parts(path: Path, rng: np.random.Generator) -> list[trimesh.Trimesh]:
-    """Return the mesh's parts, Y-up in metres, scaled and turned."""
+    """Return the mesh's parts, Y-up in metres, scaled and rotated."""
     parts, up = parts_of(path)
     scale = rng.uniform(0.92, 1.08) * rng.uniform(0.97, 1.03, 3)
     turn = trimesh.transformations.rotation_matrix(rng.uniform(0, 2 * np.pi), [0, 1, 0])
@@ -87,7 +87,7 @@ def varied_parts(path: Path, rng: np.random.Generator) -> list[trimesh.Trimesh]:
 
 @lru_cache(maxsize=1)
 def parts_of(path: Path) -> tuple[list[trimesh.Trimesh], str]:
-    """Return the parts of a mesh file in metres, and its up axis (the data's meshes without one are Z-up)."""
+    """Return the parts of a mesh file in metres, and its up axis; meshes that declare none are Z-up."""
     mesh = read_mesh(path)
     for part in mesh.parts:
         part.apply_scale(mesh.unit_m or 1.0)
@@ -95,7 +95,7 @@ def parts_of(path: Path) -> tuple[list[trimesh.Trimesh], str]:
 
 
 def spdx(licence: str) -> str:
-    """Return the SPDX id of a licence in words, ``unknown`` where it is not one for all."""
+    """Return the SPDX id of a licence in words, or ``unknown`` if it has no single one."""
     return next((found for words, found in SPDX.items() if words in licence), "unknown")
 
 

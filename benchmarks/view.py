@@ -1,10 +1,10 @@
-"""Time the gallery's pages over a synthetic index of 100,000 twins, through the running server, and measure its memory.
+"""Time the pages of the gallery over a synthetic index of 100,000 twins through the running server, and measure its memory.
 
     python benchmarks/view.py [--twins N] [--requests N] [--keep FOLDER]
 
-``manitwin view`` serves the index in a process of its own. Each kind of page is asked for so many times, with other words,
-bounds and page numbers each time; the columns are milliseconds from request to the last byte, one request at a time, on the
-same machine. Memory is the server's resident set, at first and at the end (VmRSS of Linux).
+``manitwin view`` serves the index in a separate process. Each kind of page is requested ``--requests`` times, with other words,
+bounds and page numbers each time. The columns are milliseconds from request to the last byte, one request at a time, on the same
+machine. Memory is the server's resident set at the start and at the end (VmRSS of Linux).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ BAR_MS, BAR_MB = 300.0, 500.0
 
 
 def pages(rng: np.random.Generator, twins: int) -> dict[str, str]:
-    """Return an address of each kind."""
+    """Return an address for each kind of page."""
     category, color = str(rng.choice(CATEGORIES)).replace(" ", "+"), str(rng.choice(COLORS))
     return {
         "first page": "/",
@@ -46,12 +46,12 @@ def pages(rng: np.random.Generator, twins: int) -> dict[str, str]:
 
 
 def memory_mb(process: int) -> float:
-    """Return the resident set of a process."""
+    """Return the resident set of a process in megabytes."""
     return int(re.findall(r"VmRSS:\s+(\d+)", Path(f"/proc/{process}/status").read_text())[0]) / 1e3
 
 
 def main() -> None:
-    """Measure."""
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--twins", type=int, default=100_000)
     parser.add_argument("--requests", type=int, default=40, help="of each kind")

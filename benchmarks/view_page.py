@@ -1,12 +1,12 @@
-"""Time a page of ``manitwin view`` in a real Chromium without a GPU, and the CPU of all its processes meanwhile.
+"""Time a page of ``manitwin view`` in a real Chromium without a GPU, and the CPU time of all its processes.
 
     manitwin view DATASET --no-browser
     python benchmarks/view_page.py LINK /twin/ID [--times 9]
 
-``LINK`` is the link of one use that the command prints. Every second time the browser's cache is empty. Shown is the time from
-the navigation's start to two frames after the last mesh was given to the renderer (``performance.now``), and the CPU seconds of
-the browser's processes (/proc, Linux): on a busy machine the first says little, and the second is an upper bound of what a quiet
-one would need, whose cores work at once.
+``LINK`` is the one-time link that the command prints. For every second load the browser's cache is empty. Printed are the time
+from the start of navigation to two frames after the last mesh was given to the renderer (``performance.now``), and the CPU
+seconds of the browser's processes (/proc, Linux). On a busy machine the first is unreliable, and the second is an upper limit for
+an idle machine, whose cores work in parallel.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ _TICKS = os.sysconf("SC_CLK_TCK")
 
 
 def processes(root: int) -> dict[int, float]:
-    """Return the CPU seconds of all descendants of a process, by their ids."""
+    """Return the CPU seconds of all descendants of a process, by process id."""
     of_parent: dict[int, list[tuple[int, float]]] = {}
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
             name, _, rest = path.read_text().rpartition(")")
-        except OSError:  # it has ended
+        except OSError:  # the process has ended
             continue
         fields = rest.split()
         seconds = (int(fields[11]) + int(fields[12])) / _TICKS
@@ -48,7 +48,7 @@ def processes(root: int) -> dict[int, float]:
 
 
 def shown(page: Any, address: str) -> tuple[float, float]:
-    """Return the seconds until a page has drawn, and the CPU seconds of the browser."""
+    """Return the seconds until a page is drawn, and the CPU seconds of the browser."""
     page.goto("about:blank")
     time.sleep(0.5)
     before = processes(os.getpid())
@@ -60,7 +60,7 @@ def shown(page: Any, address: str) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Measure."""
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("link")
     parser.add_argument("path", help="/twin/ID, /scene/ID or /episode/NUMBER, and what belongs behind #")

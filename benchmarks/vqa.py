@@ -1,10 +1,11 @@
-"""Measure questions about drawn scenes: CPU, balance, what words alone give away, and every answer derived a second time.
+"""Measure questions about rendered scenes: CPU, balance, language bias, and a second derivation of every answer.
 
     python benchmarks/vqa.py SCENES OTHER_SCENES [--twins DATASET] [--per-scene 80] [--checked N]
 
-The reader of words alone (``manitwin.scenes.vqa.blind``) is trained on the questions of SCENES and asked those of OTHER_SCENES,
-which were drawn by another seed; then the other way round. The answers of the first N scenes of OTHER_SCENES are derived again by
-``tests/scene_answers.py``, whose ``second_scene.py`` reads the files as they lie and asks MuJoCo what touches what.
+The language-only reader (``manitwin.scenes.vqa.blind``) is trained on the questions of SCENES and tested on those of
+OTHER_SCENES, which were drawn with another seed, and then the other way round. The answers of the first N scenes of OTHER_SCENES
+are derived again by ``tests/scene_answers.py``, whose ``second_scene.py`` reads the files directly and uses MuJoCo to detect
+contacts.
 """
 
 from __future__ import annotations

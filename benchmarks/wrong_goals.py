@@ -1,4 +1,4 @@
-"""Negative controls: goals of skills whose way is wrong on purpose, judged against what was asked for; none may be reached."""
+"""Negative controls: goals of skills with a deliberately wrong motion, judged against the original goal; none may be reached."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from manitwin.scenes.layouts.twin_frames import TwinFrame
 
 FAR_M, RAISED_M, LOWERED_M = 0.15, 0.04, 0.12
 BESIDE_M = {"hang": 0.06, "press": 0.03, "strike": 0.09}
-"""Where another way than 15 cm beside is asked for: a peg, a button and a face are small."""
+"""Displacements (m) that differ from 15 cm, by skill: a peg, a button and a striking face are small."""
 AT_PARTNERS = ("place_in", "place_on", "stack", "near")
 SIDES = ("left_of", "right_of", "behind", "in_front_of")
 CONTROLS: dict[str, tuple[str, ...]] = {
@@ -37,18 +37,24 @@ CONTROLS: dict[str, tuple[str, ...]] = {
     "cut_motion": ("beside", "turned", "raised"),
     "aim": ("beside", "turned"),
 }
-"""What is done wrong, by skill; of a handover by ``benchmarks/handover.py``."""
+"""Kinds of errors by skill; those of a handover are in ``benchmarks/handover.py``."""
 
 
 def wrong_goal(
     goal: SkillGoal, skill: str, kind: str, objects: Sequence[PlacedObject], rng: np.random.Generator
 ) -> SkillGoal:
-    """Return a goal that is asked for and not gone for; the target is the first of ``objects``, its partner the second.
+    """Return a goal with an error of the given kind; the target is the first of ``objects`` and its partner the second.
 
-    beside: the whole way in a random direction (across a peg, away from a partner that it is put in, on or beside, across what it
-    points along, to where the fingertips are of what is pressed), of a push the mark (``pushed_beside``); other side: mirrored at
-    the partner; lying: as it lay; low and raised: the way lower by 12 cm, higher by 4 cm; turned: asked of another side of the
-    thing, its frames by 90 degrees about their X; empty: no granules.
+    The kinds are:
+
+    - beside: the whole motion shifted in a random direction: across a peg, away from a partner in, on or beside which the target
+      is put, across the pointing direction, or to the fingertips of what is pressed; for a push the mark is shifted
+      (``pushed_beside``);
+    - other side: mirrored at the partner;
+    - lying: in the start orientation;
+    - low, raised: 12 cm lower, 4 cm higher;
+    - turned: another side of the object, its frames rotated by 90 degrees about their X;
+    - empty: no granules.
     """
     if kind == "empty":
         return replace(goal, granules=None)
@@ -79,14 +85,14 @@ def wrong_goal(
 
 
 def pushed_beside(skill: str, kind: str, rng: np.random.Generator) -> AbstractContextManager[object]:
-    """Return a context in which what is pushed goes 15 cm beside its mark; of any other control nothing changes in it."""
+    """Return a context in which a pushed object goes 15 cm beside its mark; it changes nothing for other controls."""
     if (skill, kind) != ("push", "beside"):
         return nullcontext()
     way, begin = _beside_m(FAR_M, rng), PushCourse.__init__
 
     def astray(course: PushCourse, start: Start, facts: EpisodeFacts) -> None:
         begin(course, start, facts)
-        course._place_m = course._place_m + way  # its guards as well, or a stroke across the true mark would end there
+        course._place_m = course._place_m + way  # the guards too, or a stroke across the true mark would end there
 
     return mock.patch.object(PushCourse, "__init__", astray)
 
@@ -110,9 +116,10 @@ def _way_m(
 
 
 def _across(poses: np.ndarray, off: np.ndarray) -> np.ndarray:
-    """Return a shift as far as ``off``, level and across the way of poses ``(K, 4, 4)`` to the side where that goes.
+    """Return a horizontal shift as long as ``off``, perpendicular to the direction of poses ``(K, 4, 4)``, on the side of
+    ``off``.
 
-    Fifteen centimetres along the way that it points a nozzle still points there, from farther away.
+    A nozzle shifted by 15 cm along its pointing direction would still point at the same place from farther away.
     """
     side = np.cross([0.0, 0, 1], poses[-1, :3, 3] - poses[0, :3, 3])
     way_m = np.linalg.norm(off[:3, 3]) * side / max(float(np.linalg.norm(side)), 1e-9)
@@ -120,9 +127,9 @@ def _across(poses: np.ndarray, off: np.ndarray) -> np.ndarray:
 
 
 def _hand_aside(poses: np.ndarray, off: np.ndarray, tips_m: np.ndarray) -> np.ndarray:
-    """Return a level shift as far as ``off`` for poses ``(K, 4, 4)`` of a hand, to the side where its fingertips are.
+    """Return a horizontal shift as long as ``off`` for poses ``(K, 4, 4)`` of a hand, towards the side of its fingertips.
 
-    They are 3 cm wide: shifted to another side, the corner that presses is 3 cm off and another one presses on the place.
+    Fingertips are 3 cm wide. With a shift to another side, another corner would press on the same place.
     """
     corner_m, _ = first_corner(tips_m, poses[-1, :3, :3], poses[-1, :3, 3] - poses[0, :3, 3])
     side = poses[-1, :3, :3] @ (tips_m.mean(0) - corner_m) * [1.0, 1.0, 0.0]
@@ -130,9 +137,10 @@ def _hand_aside(poses: np.ndarray, off: np.ndarray, tips_m: np.ndarray) -> np.nd
 
 
 def _far_out_m(vessel: PlacedObject, away_m: np.ndarray, way: np.ndarray) -> float:
-    """Return how far along a unit way what is at ``away_m`` from a vessel's centre goes to be 15 cm beside the vessel.
+    """Return the distance along a unit vector by which ``away_m`` (relative to a vessel's centre) moves to 15 cm beside the
+    vessel.
 
-    Fifteen centimetres from a place in a pan are still in the pan.
+    A shift by 15 cm from a place inside a pan may still end in the pan.
     """
     points = transform_points(vessel.object_to_world, np.concatenate(vessel.body.hulls)) - _center_m(vessel, None)
     return float((points @ way).max()) + FAR_M - float(away_m @ way)
