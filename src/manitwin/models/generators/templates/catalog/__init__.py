@@ -1,15 +1,19 @@
-"""The templates: a module of builders a family, and beside it a table of their measures, looks and names.
+"""Templates of categories: one module of builder functions per family, with a table of dimensions, looks and names beside it.
 
-A row of a table (``vessels.toml`` beside ``vessels.py``) has the names besides the category, which is one of the priors'; looks
-by slot to draw from ('colour material'; '' looks like the first slot); the mean density of closed containers with what is in
-them; the parts that are hollow behind a sheet where they are of metal (``of_sheet``); and the measures as [low, typical, high]:
-the interval that nearly all such things are in. A name that ends in ``_m`` is in metres, any other is a ratio. ``wall_m`` is that
-of ceramic; other materials have walls of their own (``looks``), but for metal where the thing is ``of_plate``. A length without a
-direction is that of the whole, or of the part ``length_of``. What has ``any_proportions`` is as long, wide and high as a text
-says, other things keep near their measures. What has ``any_front`` has no side of its own that is the front; what is
-``told_in_full`` is not meant by the last word of its name alone, but in a text by its ``bare`` names where no other noun is said
-with them. Typical retail sizes; ``docs/templates.md`` says how they were
-checked.
+A row of a table (``vessels.toml`` beside ``vessels.py``) describes one template. Its fields are:
+
+- the category, which is one of the priors', and the other names of the object;
+- the looks of each slot to draw from, as 'colour material'; '' means the look of the first slot;
+- the mean density of a closed container including its contents;
+- the parts that are hollow sheet if they are of metal (``of_sheet``);
+- the dimensions as [low, typical, high]: the interval that contains nearly all objects of the category.
+
+A dimension whose name ends in ``_m`` is in metres, any other is a ratio. ``wall_m`` holds for ceramic; other materials have their
+own wall thickness (``looks``), except metal if the object is ``of_plate``. A length without a direction refers to the whole
+object, or to the part ``length_of``. An object with ``any_proportions`` takes length, width and height from a text unchanged,
+others stay near their dimensions. An object with ``any_front`` has no side that is its front. An object that is ``told_in_full``
+is not meant by the last word of its name alone, but in a text also by its ``bare`` names if they occur without another noun. The
+dimensions are typical retail sizes; ``docs/templates.md`` describes how they were checked.
 """
 
 from __future__ import annotations
@@ -37,7 +41,10 @@ FAMILIES = (
 
 @cache
 def load_templates() -> dict[str, Template]:
-    """Return all templates by category, sorted; raises ManiTwinError where a table and its builders contradict each other."""
+    """Return all templates by category, sorted.
+
+    Raises ManiTwinError if a table and its builders contradict each other.
+    """
     templates: dict[str, Template] = {}
     for family in FAMILIES:
         module, file = f"{__name__}.{family}", f"{family}.toml"

@@ -1,4 +1,4 @@
-"""What a person wears and carries: glasses and watches, shoes and hats, a wallet, a lighter, a suitcase."""
+"""Things that people wear and carry: glasses and watches, shoes and hats, a wallet, a lighter, a suitcase."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _lens(x_m: float, z_m: float) -> CrossSection:
 
 @template("glasses")
 def glasses(*, width_m: float, lens: float, height: float, temple_m: float, frame_m: float) -> Model:
-    """Build glasses that stand on their rims and the ends of their temples, the lenses towards -Y."""
+    """Build glasses that stand on their rims and the ends of their temples, with the lenses towards -Y."""
     wide = lens * width_m
     high = height * wide
     at, middle = 0.5 * width_m - 0.5 * wide - frame_m, 0.5 * high + frame_m
@@ -69,9 +69,10 @@ def glasses(*, width_m: float, lens: float, height: float, temple_m: float, fram
 
 
 def _strapped(model: Model, loop_m: float, strap_m: float, thick_m: float, least_m: float) -> tuple[float, float]:
-    """Add a closed strap about Z with its buckle at +Y; return where its front is in Y and the tilt at which a case on it lies.
+    """Add a closed strap about Z with its buckle at +Y.
 
-    ``least_m`` is the half height of the case, which stands out below the strap.
+    Returns the Y coordinate of its front, and the tilt (degrees) at which a case on it rests. ``least_m`` is half the height of
+    the case, which protrudes below the strap.
     """
     turn = np.linspace(-0.38 * np.pi, 1.38 * np.pi, 48)
     half_x, half_y = 0.5 * loop_m, 0.43 * loop_m
@@ -85,14 +86,14 @@ def _strapped(model: Model, loop_m: float, strap_m: float, thick_m: float, least
 
 
 def _tilted(place: Point, tilt: float) -> Point:
-    """Return (y, z) turned about X by an angle in degrees."""
+    """Return (y, z) rotated about X by an angle in degrees."""
     sin, cos = float(np.sin(np.radians(tilt))), float(np.cos(np.radians(tilt)))
     return place[0] * cos - place[1] * sin, place[0] * sin + place[1] * cos
 
 
 @template("watch")
 def watch(*, case_m: float, thick: float, strap: float, loop_m: float) -> Model:
-    """Build a watch that lies on the edges of its closed strap and its case, the dial towards -Y."""
+    """Build a watch that rests on the edges of its closed strap and its case, with the dial towards -Y."""
     r, deep = 0.5 * case_m, thick * case_m
     model = Model()
     front, tilt = _strapped(model, loop_m, strap * case_m, 0.0026, r)
@@ -145,11 +146,11 @@ def watch(*, case_m: float, thick: float, strap: float, loop_m: float) -> Model:
 
 @template("smart watch")
 def smart_watch(*, case_m: float, width: float, thick: float, strap: float, loop_m: float) -> Model:
-    """Build a watch with a screen of rounded corners that lies on its closed strap, the screen towards -Y."""
+    """Build a watch with a rounded rectangular screen that rests on its closed strap, with the screen towards -Y."""
     across, deep = width * case_m, thick * case_m
     model = Model()
     front, tilt = _strapped(model, loop_m, strap * across, 0.0028, 0.5 * across)
-    # the strap runs along the case's longer side, which is along X here
+    # The strap follows the longer side of the case, which is along X here.
     face = front - deep + 0.002
 
     def on_case(solid: Manifold, z_m: float) -> Manifold:
@@ -172,7 +173,7 @@ def smart_watch(*, case_m: float, width: float, thick: float, strap: float, loop
 
 @template("wallet")
 def wallet(*, length_m: float, width: float, thick_m: float) -> Model:
-    """Build a folded wallet that lies, its fold towards +Y, with cards and notes between its halves."""
+    """Build a lying folded wallet, with the fold towards +Y and cards and notes between its halves."""
     across, leaf = width * length_m, 0.36 * thick_m
     half = prism(rectangle(length_m, across, radius_m=0.007), leaf, radius_m=0.4 * leaf)
     model = Model().add("cover", half).add("cover", half.translate((0, 0, thick_m - leaf)))
@@ -192,7 +193,7 @@ def wallet(*, length_m: float, width: float, thick_m: float) -> Model:
 
 @template("lighter")
 def lighter(*, height_m: float, width: float, thick: float) -> Model:
-    """Build a lighter that stands, its wheel towards -X and its lever towards +X."""
+    """Build a standing lighter, with the wheel towards -X and the lever towards +X."""
     x, h = width * height_m, height_m
     y = thick * x
     oval = rectangle(x, y, radius_m=0.48 * y)

@@ -1,4 +1,4 @@
-"""Small appliances and fixtures of a room: they stand on a foot, a sole or a base."""
+"""Small appliances and fixtures of a room, which stand on a foot, a soleplate or a base."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 
 def _rod(start: tuple[float, float, float], end: tuple[float, float, float], radius_m: float) -> Manifold:
-    """Return a round rod between two places."""
+    """Return a round rod between two points."""
     return tube(np.array([start, end]), radius_m)
 
 
@@ -53,7 +53,7 @@ def desk_lamp(*, height_m: float, base: float, reach: float, shade: float) -> Mo
 
 @template("iron")
 def iron(*, length_m: float, width: float, height: float) -> Model:
-    """Build a steam iron on its sole, the point towards +X, its handle above."""
+    """Build a steam iron on its soleplate, with the tip towards +X and the handle above."""
     end, half, high = 0.5 * length_m, 0.5 * width * length_m, height * length_m
     share = np.linspace(0, 1, 16)
     sides = half * np.interp(share, [0, 0.08, 0.3, 0.55, 0.8, 0.93, 1], [0.8, 0.95, 1, 0.92, 0.55, 0.24, 0.03])
@@ -91,7 +91,7 @@ def iron(*, length_m: float, width: float, height: float) -> Model:
 
 @template("fire extinguisher")
 def fire_extinguisher(*, height_m: float, width: float, valve: float) -> Model:
-    """Build an extinguisher that stands, its levers and its hose towards +X, the gauge towards -Y."""
+    """Build a standing extinguisher, with levers and hose towards +X and the gauge towards -Y."""
     r, top = 0.5 * width * height_m, (1 - valve) * height_m
     profile = [
         (0, 0),
@@ -182,7 +182,7 @@ def phone_stand(*, width_m: float, height: float, depth: float, lip: float) -> M
 
 @template("door knob")
 def door_knob(*, width_m: float, reach: float, rose: float) -> Model:
-    """Build a knob that stands on the plate by which it is screwed to the door."""
+    """Build a knob that stands on its mounting plate."""
     r, high, plate = 0.5 * width_m, reach * width_m, 0.5 * rose * width_m
     model = Model().add(
         "plate",

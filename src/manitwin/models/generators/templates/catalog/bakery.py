@@ -1,4 +1,4 @@
-"""What a bakery and a snack bar sell: it lies, or stands, as it is served."""
+"""Goods of a bakery and a snack bar, lying or standing as they are served."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 
 def _both_faces(model: Model, height_m: float, off_m: float = 0.0) -> Model:
-    """Note the upper and the lower side, ``off_m`` beside the middle, and lay the model down."""
+    """Add points on the upper and the lower side, ``off_m`` beside the centre, and place the model on the ground."""
     model.point("top", "surface", "body", (off_m, 0.0, height_m), (0.0, 0.0, 1.0))
     return model.point("base", "surface", "body", (off_m, 0.0, 0.0), (0.0, 0.0, -1.0)).laid()
 
@@ -50,7 +50,7 @@ def bagel(*, width_m: float, thick: float, hole: float) -> Model:
 
 @template("bun")
 def bun(*, width_m: float, tall: float, flat: float) -> Model:
-    """Build a round bun; ``flat`` is the height at which it is widest over the whole one."""
+    """Build a round bun; ``flat`` is the height of its widest cross-section relative to the total height."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [
         (0, 0.0),
@@ -72,7 +72,7 @@ def bun(*, width_m: float, tall: float, flat: float) -> Model:
 
 @template("croissant")
 def croissant(*, length_m: float, width: float, bend: float) -> Model:
-    """Build a croissant lying, its tips towards -Y; ``bend`` is the angle in rad from tip to tip."""
+    """Build a lying croissant, with the tips towards -Y; ``bend`` is the angle in rad from tip to tip."""
     about, angle = length_m / (2 * np.sin(0.5 * min(bend, np.pi))), np.linspace(-0.5 * bend, 0.5 * bend, 64)
     path = np.column_stack([about * np.sin(angle), about * np.cos(angle) - about, 0 * angle])
     share = np.linspace(0, 1, 64)
@@ -88,7 +88,10 @@ def croissant(*, length_m: float, width: float, bend: float) -> Model:
 
 @template("muffin")
 def muffin(*, width_m: float, tall: float, foot: float, dome: float) -> Model:
-    """Build a muffin in its paper cup; ``foot`` is the cup's lower width over the muffin's, ``dome`` its crown's share."""
+    """Build a muffin in its paper cup.
+
+    ``foot`` is the cup's lower width relative to the muffin's, ``dome`` the share of the top in the height.
+    """
     r, h = 0.5 * width_m, tall * width_m
     low = (1 - dome) * h
     cup = lathe([(foot * r, 0.0), (0.86 * r, low)], sides=chords(96))
@@ -115,7 +118,7 @@ def muffin(*, width_m: float, tall: float, foot: float, dome: float) -> Model:
 
 @template("bread slice")
 def bread_slice(*, width_m: float, tall: float, thick_m: float, dome: float) -> Model:
-    """Build a slice of bread lying on its cut face, its domed side towards +Y; ``dome`` is that part's share."""
+    """Build a slice of bread lying on its cut face, with the domed side towards +Y; ``dome`` is the share of that side."""
     w, d = width_m, tall * width_m
     low = (1 - dome) * d
     turn = np.linspace(0.0, np.pi, 15)
@@ -139,7 +142,7 @@ def bread_slice(*, width_m: float, tall: float, thick_m: float, dome: float) -> 
 
 @template("hamburger")
 def hamburger(*, width_m: float, crown: float, patty: float, heel: float) -> Model:
-    """Build a hamburger that stands: ``heel``, ``patty`` and ``crown`` are the heights of its layers over its width."""
+    """Build a standing hamburger: ``heel``, ``patty`` and ``crown`` are the heights of its layers relative to its width."""
     r, low, meat, high = 0.5 * width_m, heel * width_m, patty * width_m, crown * width_m
     model = Model().add(
         "heel", lathe(rounded([(0, 0), (0.9 * r, 0), (0.96 * r, 0.5 * low), (0.94 * r, low), (0, low)], 0.3 * low))
@@ -178,7 +181,7 @@ def hamburger(*, width_m: float, crown: float, patty: float, heel: float) -> Mod
 
 
 def _sausage(length_m: float, width_m: float, bend: float) -> tuple[Manifold, np.ndarray]:
-    """Return a sausage along X, bent in its plane by ``bend`` of its length, and its middle line ``(N, 3)``."""
+    """Return a sausage along X, curved in its plane by ``bend`` of its length, and its centre line ``(N, 3)``."""
     share = np.linspace(0, 1, 40)
     path = np.column_stack([(share - 0.5) * length_m, bend * length_m * (1 - 4 * (share - 0.5) ** 2), 0 * share])
     end = 0.5 * width_m / length_m
@@ -188,7 +191,9 @@ def _sausage(length_m: float, width_m: float, bend: float) -> tuple[Manifold, np
 
 @template("sausage")
 def sausage(*, length_m: float, width: float, bend: float) -> Model:
-    """Build a sausage lying, its ends tied; ``bend`` is how far its middle is off the line of its ends, of the length."""
+    """Build a lying sausage with tied ends; ``bend`` is the distance of its middle from the line through its ends, over the
+    length.
+    """
     r = 0.5 * width * length_m
     body, path = _sausage(length_m, 2 * r, bend)
     model = Model().add("body", body)
@@ -205,7 +210,7 @@ def sausage(*, length_m: float, width: float, bend: float) -> Model:
 
 @template("hot dog")
 def hot_dog(*, length_m: float, width: float, sausage: float, sauce_m: float) -> Model:
-    """Build a hot dog lying, its bun open upwards; ``sausage`` is the sausage's thickness over the bun's width."""
+    """Build a lying hot dog whose bun is open above; ``sausage`` is the sausage's thickness relative to the bun's width."""
     w, thick = width * length_m, sausage * width * length_m
     loaf, _ = _sausage(0.92 * length_m, w, 0.0)
     bread = loaf.scale((1, 1, 0.82))
@@ -226,7 +231,7 @@ def hot_dog(*, length_m: float, width: float, sausage: float, sauce_m: float) ->
 
 @template("waffle")
 def waffle(*, width_m: float, thick_m: float, cells: float, deep: float) -> Model:
-    """Build a round waffle lying; ``cells`` are the hollows across it, ``deep`` their depth over its thickness."""
+    """Build a lying round waffle with ``cells`` hollows across; ``deep`` is their depth relative to the thickness."""
     r, count = 0.5 * width_m, round(cells)
     pitch, high = width_m / count, deep * thick_m
     pit = box(0.62 * pitch, 0.62 * pitch, 2 * high)

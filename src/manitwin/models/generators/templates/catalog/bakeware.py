@@ -1,4 +1,4 @@
-"""What bakes, sifts and measures: tins, a sieve, a scoop, a timer, and vessels of a laboratory. A handle is towards +X."""
+"""Things to bake, sift and measure with: tins, a sieve, a scoop, a timer, and laboratory vessels. Handles point to +X."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("cake pan")
 def cake_pan(*, width_m: float, height: float, taper: float, wall_m: float) -> Model:
-    """Build a round pan with a rolled rim; ``taper`` is its foot's width over its mouth's."""
+    """Build a round pan with a rolled rim; ``taper`` is the width at the foot relative to the rim."""
     r, h = 0.5 * width_m, height * width_m
     model = hollowed(Model(), rounded([(taper * r, 0.0), (taper * r, 0.002), (r, h)], 0.006), wall_m, wall_m)
     roll = torus(r, max(0.002, 1.6 * wall_m), sides=chords(72)).translate((0, 0, h - 0.001))
@@ -32,7 +32,9 @@ def cake_pan(*, width_m: float, height: float, taper: float, wall_m: float) -> M
 
 
 def _basin(length_m: float, width_m: float, height_m: float, wall_m: float, slope: float) -> tuple[Manifold, Manifold]:
-    """Return the outer solid of an oblong pan, whose foot is ``slope`` times as large as its mouth, and what is cut out of it."""
+    """Return the outer solid of an oblong pan, whose foot is ``slope`` times as large as its rim, and the solid to subtract from
+    it.
+    """
     corner = 0.12 * width_m
 
     def tapered(x_m: float, y_m: float, low_m: float) -> Manifold:
@@ -80,7 +82,9 @@ def loaf_pan(*, length_m: float, width: float, height: float, wall_m: float, slo
 
 @template("muffin tin")
 def muffin_tin(*, pitch_m: float, columns: float, depth: float, wall_m: float) -> Model:
-    """Build a sheet with ``columns`` by two thirds as many cups; ``pitch_m`` is from cup to cup, ``depth`` over that."""
+    """Build a sheet with ``columns`` by two thirds as many cups; ``pitch_m`` is the distance between cups, ``depth`` is relative
+    to it.
+    """
     nx = round(columns)
     ny, h, r = max(2, round(2 * nx / 3)), depth * pitch_m, 0.43 * pitch_m
     x, y = (nx + 0.12) * pitch_m, (ny + 0.12) * pitch_m
@@ -98,7 +102,10 @@ def muffin_tin(*, pitch_m: float, columns: float, depth: float, wall_m: float) -
 
 @template("sieve")
 def sieve(*, width_m: float, depth: float, handle: float, mesh: float) -> Model:
-    """Build a kitchen sieve standing on its net, level; ``depth`` and ``handle`` are shares of the width, ``mesh`` in wires."""
+    """Build a level kitchen sieve that stands on its mesh.
+
+    ``depth`` and ``handle`` are relative to the width; ``mesh`` is a number of wires.
+    """
     r, h, wall = 0.5 * width_m, depth * width_m, 0.0016
     turn = np.linspace(0.0, np.pi / 2, 12)
     side = [(float(r * np.sin(a)), float(h * (1 - np.cos(a)))) for a in turn[1:]]
@@ -137,7 +144,7 @@ def sieve(*, width_m: float, depth: float, handle: float, mesh: float) -> Model:
 
 
 def _net_holes(r: float, h: float, rows: int) -> Manifold:
-    """Return upright pins through a bowl of radius ``r`` and depth ``h``, in ``rows`` each way."""
+    """Return vertical pins through a bowl of radius ``r`` and depth ``h``, in ``rows`` along each direction."""
     pitch = 2 * r / rows
     pin = box(0.55 * pitch, 0.55 * pitch, 2 * h).translate((0, 0, -0.5 * h))
     at = (np.arange(rows) - 0.5 * (rows - 1)) * pitch
@@ -148,14 +155,17 @@ def _net_holes(r: float, h: float, rows: int) -> Manifold:
 
 @template("petri dish")
 def petri_dish(*, width_m: float, height: float, wall_m: float) -> Model:
-    """Build a dish of a laboratory without its cover."""
+    """Build a laboratory dish without its lid."""
     r, h = 0.5 * width_m, height * width_m
     return hollowed(Model(), rounded([(0.985 * r, 0.0), (r, 0.001), (r, h)], 0.001), wall_m, wall_m)
 
 
 @template("graduated cylinder")
 def graduated_cylinder(*, height_m: float, width: float, foot: float, wall_m: float) -> Model:
-    """Build a measuring cylinder on a foot with a scale and a lip towards -X; ``foot`` is that one's width over the tube's."""
+    """Build a measuring cylinder with a scale, a spout towards -X, and a foot.
+
+    ``foot`` is the foot's width relative to the tube's.
+    """
     h, r = height_m, 0.5 * width * height_m
     low = 0.03 * h
     model = Model().add(
@@ -183,7 +193,7 @@ def graduated_cylinder(*, height_m: float, width: float, foot: float, wall_m: fl
 
 @template("test tube rack")
 def test_tube_rack(*, columns: float, pitch_m: float, hole_m: float, height_m: float, board_m: float) -> Model:
-    """Build three boards between two ends, ``columns`` by two holes in the upper ones."""
+    """Build three boards between two end plates, with ``columns`` by two holes in the upper boards."""
     count = round(columns)
     x, y = count * pitch_m + 0.5 * pitch_m, 2 * pitch_m + 0.3 * pitch_m
     end = box(board_m, y, height_m, radius_m=0.2 * board_m)
@@ -208,7 +218,7 @@ def test_tube_rack(*, columns: float, pitch_m: float, hole_m: float, height_m: f
 
 @template("kitchen timer")
 def kitchen_timer(*, width_m: float, height: float, dial: float) -> Model:
-    """Build a wind-up timer that stands, a dial with a grip on its upper half; ``height`` and ``dial`` are over its width."""
+    """Build a standing wind-up timer with a dial and grip above; ``height`` and ``dial`` are relative to the width."""
     r, h = 0.5 * width_m, height * width_m
     low = 0.42 * h
     model = Model().add("body", lathe(rounded([(0, 0), (0.92 * r, 0), (r, 0.2 * h), (r, low), (0, low)], 0.06 * r)))
@@ -230,7 +240,10 @@ def kitchen_timer(*, width_m: float, height: float, dial: float) -> Model:
 
 @template("scoop")
 def scoop(*, length_m: float, head: float, width: float, deep: float, wall_m: float) -> Model:
-    """Build a scoop for flour lying: a round trough, open ahead; ``head`` is its share, ``width`` and ``deep`` are over that."""
+    """Build a lying flour scoop: a round trough, open in front.
+
+    ``head`` is the trough's share of the length; ``width`` and ``deep`` are relative to the trough's length.
+    """
     end, long = 0.5 * length_m, head * length_m
     r, h = 0.5 * width * long, deep * long
     start = end - long

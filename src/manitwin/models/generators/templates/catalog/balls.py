@@ -1,4 +1,4 @@
-"""Balls: about their middle first, then laid on the ground, a mark of theirs up or to the front."""
+"""Balls, built about the origin and then placed on the ground, with a distinctive mark up or to the front."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def sphere(width_m: float, sides: int = 56) -> Manifold:
 
 
 def laid_ball(model: Model, width_m: float, top: str = "body", side: str = "body") -> Model:
-    """Note the upper side and the side of a ball about the origin, and lay it down."""
+    """Add points on the top and the side of a ball about the origin, and place it on the ground."""
     r = 0.5 * width_m
     model.point("top", "surface", top, (0.0, 0.0, r), (0.0, 0.0, 1.0))
     return model.point("side", "surface", side, (0.0, -r, 0.0), (0.0, -1.0, 0.0)).laid()
@@ -23,7 +23,7 @@ def laid_ball(model: Model, width_m: float, top: str = "body", side: str = "body
 
 @template("ball")
 def ball(*, width_m: float, stripe: float) -> Model:
-    """Build a ball with a stripe around it, whose height is ``stripe`` of the ball's."""
+    """Build a ball with a stripe around it; ``stripe`` is the stripe's height relative to the ball's."""
     r, edge = 0.5 * width_m, np.arcsin(stripe)
     below, above = np.linspace(-0.5 * np.pi, -edge, 12), np.linspace(edge, 0.5 * np.pi, 12)
     angles = np.concatenate([below, np.linspace(-edge, edge, 7)[1:-1], above])
@@ -40,7 +40,7 @@ def baseball(*, width_m: float, seam_m: float) -> Model:
     curve = [(1 - flat) * np.cos(t) + flat * np.cos(3 * t), (1 - flat) * np.sin(t) - flat * np.sin(3 * t)]
     line = np.column_stack([*curve, 2 * np.sqrt(flat * (1 - flat)) * np.sin(2 * t)])
     line *= (r - 0.3 * seam_m) / np.linalg.norm(line, axis=1)[:, None]
-    halves = [line[:82], np.concatenate([line[80:], line[:2]])]  # a tube that overlaps itself would be no solid
+    halves = [line[:82], np.concatenate([line[80:], line[:2]])]  # a self-intersecting tube is no solid
     seam = union([tube(half, seam_m, sides=8, across=(0, 0, 1)) for half in halves])
     model = Model().add("body", sphere(width_m, 64)).add("seam", seam, "seam")
     stitches = []
@@ -57,7 +57,7 @@ def baseball(*, width_m: float, seam_m: float) -> Model:
 
 
 def _twelve() -> np.ndarray:
-    """Return the corners (12, 3) of an icosahedron on the unit sphere, one of them up."""
+    """Return the corners ``(12, 3)`` of an icosahedron on the unit sphere, one of them at the top."""
     around = np.arange(5) * 2 * np.pi / 5
     z, ring = 1 / np.sqrt(5), 2 / np.sqrt(5)
     upper = np.column_stack([ring * np.cos(around), ring * np.sin(around), np.full(5, z)])
@@ -66,7 +66,7 @@ def _twelve() -> np.ndarray:
 
 @template("soccer ball")
 def soccer_ball(*, width_m: float, patch: float) -> Model:
-    """Build a soccer ball with twelve pentagons and seams; ``patch`` is a pentagon's radius over that of a regular one."""
+    """Build a soccer ball with twelve pentagons and seams; ``patch`` is a pentagon's radius relative to a regular one."""
     r, corners = 0.5 * width_m, _twelve()
     pentagons, seams = [], []
     for a, corner in enumerate(corners):
@@ -87,7 +87,7 @@ def soccer_ball(*, width_m: float, patch: float) -> Model:
 
 @template("golf ball")
 def golf_ball(*, width_m: float, dimple: float) -> Model:
-    """Build a golf ball; ``dimple`` is a dimple's width over the ball's."""
+    """Build a golf ball; ``dimple`` is a dimple's width relative to the ball's."""
     r, count = 0.5 * width_m, 150
     number = np.arange(count) + 0.5
     z, angle = 1 - 2 * number / count, 2.39996 * number
@@ -107,7 +107,7 @@ def golf_ball(*, width_m: float, dimple: float) -> Model:
 
 @template("table tennis ball")
 def table_tennis_ball(*, width_m: float, seam: float) -> Model:
-    """Build a table tennis ball, the seam of its halves around it."""
+    """Build a table tennis ball with the seam of its halves around it."""
     r, half = 0.5 * width_m, 0.5 * seam * width_m
     model = Model().add("body", sphere(width_m))
     model.add(
@@ -118,7 +118,7 @@ def table_tennis_ball(*, width_m: float, seam: float) -> Model:
 
 @template("marble")
 def marble(*, width_m: float, twist: float) -> Model:
-    """Build a marble with coloured bands; ``twist`` is how far they turn from its lower to its upper end, in turns."""
+    """Build a marble with coloured bands; ``twist`` is their rotation from the lower to the upper end, in turns."""
     r = 0.5 * width_m
     star = CrossSection([np.array([(0, 0), (1.2 * r, -0.16 * r), (1.2 * r, 0.16 * r)])])
     star = star + star.rotate(120) + star.rotate(240)
@@ -132,7 +132,7 @@ def marble(*, width_m: float, twist: float) -> Model:
 
 @template("billiard ball")
 def billiard_ball(*, width_m: float, spot: float) -> Model:
-    """Build a billiard ball with a white spot at its front and its back, whose width is ``spot`` of the ball's."""
+    """Build a billiard ball with a white spot at front and back; ``spot`` is its width relative to the ball's."""
     drum = cylinder(0.5 * spot * width_m, 2 * width_m).translate((0, 0, -width_m)).rotate((90, 0, 0))
     model = Model().add("body", sphere(width_m, 64)).add("spot", sphere(1.002 * width_m, 64) ^ drum, "spot")
     return laid_ball(model, width_m, side="spot")
@@ -140,7 +140,10 @@ def billiard_ball(*, width_m: float, spot: float) -> Model:
 
 @template("bowling ball")
 def bowling_ball(*, width_m: float, hole: float, span: float) -> Model:
-    """Build a bowling ball, its holes about the top: ``hole`` is one's width, ``span`` from fingers to thumb, over the ball's."""
+    """Build a bowling ball with its holes near the top.
+
+    ``hole`` is a hole's width and ``span`` the distance from fingers to thumb, both relative to the ball's width.
+    """
     r, radius_m = 0.5 * width_m, 0.5 * hole * width_m
     drill = cylinder(radius_m, r).translate((0, 0, 0.55 * r))
     apart, away = np.degrees(1.3 * hole), np.degrees(span)
@@ -153,7 +156,7 @@ def bowling_ball(*, width_m: float, hole: float, span: float) -> Model:
 
 @template("beach ball")
 def beach_ball(*, width_m: float, cap: float) -> Model:
-    """Build a beach ball of six strips, every other one coloured, that end at a disc above and below; ``cap`` is its width."""
+    """Build a beach ball of six strips, alternately coloured, that end at discs; ``cap`` is a disc's relative width."""
     r = 0.5 * width_m
 
     def is_coloured(centers: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Batteries: a round cell that lies, and the block of 9 V that stands, its terminals up."""
+"""Batteries: a lying round cell, and a standing 9 V block with its terminals up."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("battery")
 def battery(*, length_m: float, width: float) -> Model:
-    """Build a cell lying along X, its positive pole towards +X."""
+    """Build a cell lying along X, with the positive terminal towards +X."""
     r = 0.5 * width * length_m
     body = lathe(
         rounded(
@@ -26,9 +26,9 @@ def battery(*, length_m: float, width: float) -> Model:
 
 @template("9v battery")
 def block_battery(*, height_m: float, width: float, depth: float, band: float) -> Model:
-    """Build a block of 9 V that stands, its front towards -Y; ``band`` is the share of its height in another colour.
+    """Build a standing 9 V block, with the front towards -Y; ``band`` is the share of its height in another colour.
 
-    Sides of 6LR61, pitch and height of its snap terminals: IEC 60086-2.
+    The side lengths of 6LR61, and the pitch and height of its snap terminals, follow IEC 60086-2.
     """
     stud = 0.0026
     x, y, h = width * height_m, depth * height_m, height_m - stud

@@ -1,4 +1,4 @@
-"""Blocks to stack and build with: cubes, blocks of wood, toy bricks."""
+"""Blocks to stack and build with: cubes, wooden blocks, toy bricks."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("cube")
 def cube(*, width_m: float, edge: float) -> Model:
-    """Build a cube; ``edge`` is the radius of its edges over its width."""
+    """Build a cube; ``edge`` is the radius of its edges relative to its width."""
     return _block(width_m, width_m, width_m, edge * width_m)
 
 
 @template("wood block")
 def wood_block(*, length_m: float, width: float, thick: float, edge: float) -> Model:
-    """Build a block lying on its broadest side, long along X; ``edge`` is the radius of its edges over its thickness."""
+    """Build a block lying on its largest face, with its length along X; ``edge`` is the edge radius relative to the thickness."""
     return _block(length_m, width * length_m, thick * width * length_m, edge * thick * width * length_m)
 
 
@@ -32,7 +32,10 @@ def _block(x_m: float, y_m: float, z_m: float, radius_m: float) -> Model:
 
 @template("building block")
 def building_block(*, length_m: float, height: float, wall_m: float) -> Model:
-    """Build a brick with two rows of four studs, hollow from below, a fortieth of a pitch less than their places."""
+    """Build a brick with two rows of four studs, hollow from below.
+
+    Its sides are smaller than its grid places by 1/40 of the pitch.
+    """
     pitch = length_m * STUD_PITCH_M / (4 * STUD_PITCH_M - BRICK_GAP_M)
     y, h = pitch * (2 - BRICK_GAP_M / STUD_PITCH_M), height * length_m
     stud, raised = 0.3 * pitch, 0.22 * pitch

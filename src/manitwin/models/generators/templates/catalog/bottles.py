@@ -1,4 +1,4 @@
-"""Closed containers that stand: bottles, jars, cans, shakers, sprays. Full solids: what is inside is not modelled."""
+"""Standing closed containers: bottles, jars, cans, shakers, sprays. They are full solids; the contents are not modelled."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.models.generators.templates.template import Model, template
 def capped(
     model: Model, profile: list[tuple[float, float]], cap: list[tuple[float, float]], corner_m: float = 0.006
 ) -> Model:
-    """Add a turned ``body`` and ``cap``, and note the cap's top and the body's base."""
+    """Add a ``body`` and a ``cap`` of revolution, and points on the top of the cap and the base of the body."""
     model.add("body", lathe(rounded([(0.0, 0.0), *profile], corner_m)))
     model.add("cap", lathe(rounded(cap, 0.0015)), "cap")
     top = max(z for _, z in cap)
@@ -32,7 +32,7 @@ def _bottle(height_m: float, width: float, shoulder: float, neck: float, cap: fl
 
 @template("bottle")
 def bottle(*, height_m: float, width: float, shoulder: float, neck: float, cap: float) -> Model:
-    """Build a bottle with a cap: ``shoulder`` is where its body ends, ``neck`` over the body's width."""
+    """Build a bottle with a cap; ``shoulder`` is the relative height where the body ends, ``neck`` is relative to its width."""
     return _bottle(height_m, width, shoulder, neck, cap)
 
 
@@ -68,7 +68,7 @@ def jar(*, height_m: float, width: float, neck: float, cap: float) -> Model:
 
 @template("can")
 def can(*, height_m: float, width: float, rim_m: float) -> Model:
-    """Build a food can: beaded rims, ends a little sunk."""
+    """Build a food can with beaded rims and slightly recessed ends."""
     h, r = height_m, 0.5 * width * height_m
     body = [(0, 0.003), (r - 2 * rim_m, 0.003), (r - 2 * rim_m, 0.0), (r, 0.0), (r, 0.004), (r - rim_m, 0.006)]
     body += [(q, h - z) for q, z in reversed(body)]
@@ -81,7 +81,7 @@ def can(*, height_m: float, width: float, rim_m: float) -> Model:
 
 @template("drink can")
 def drink_can(*, height_m: float, width: float, neck: float) -> Model:
-    """Build a drink can with a drawn-in neck, a sunk lid and its ring."""
+    """Build a drink can with a narrowed neck, a recessed lid and its ring."""
     h, r = height_m, 0.5 * width * height_m
     profile = rounded(
         [
@@ -110,7 +110,7 @@ def drink_can(*, height_m: float, width: float, neck: float) -> Model:
 
 @template("shampoo bottle")
 def shampoo_bottle(*, height_m: float, width: float, flat: float, cap: float) -> Model:
-    """Build an oval bottle: ``flat`` is its depth over its width."""
+    """Build an oval bottle; ``flat`` is its depth relative to its width."""
     h, r = height_m, 0.5 * width * height_m
     top = (1 - cap) * h
     body = lathe(
@@ -125,7 +125,7 @@ def shampoo_bottle(*, height_m: float, width: float, flat: float, cap: float) ->
 
 @template("pump bottle")
 def pump_bottle(*, height_m: float, width: float, body: float, spout_m: float) -> Model:
-    """Build a bottle with a pump whose spout points towards -Y; it is pressed from above."""
+    """Build a bottle with a pump that is pressed from above and whose spout points to -Y."""
     h, r, top = height_m, 0.5 * width * height_m, body * height_m
     model = Model().add("body", lathe(rounded([(0, 0), (r, 0), (r, 0.86 * top), (0.42 * r, top), (0, top)], 0.012)))
     model.add("collar", cylinder(0.46 * r, 0.1 * h).translate((0, 0, top - 0.003)), "pump")
@@ -202,7 +202,7 @@ def salt_shaker(*, height_m: float, width: float, cap: float) -> Model:
 
 @template("pepper mill")
 def pepper_mill(*, height_m: float, width: float, waist: float, cap: float) -> Model:
-    """Build a turned mill: the cap is twisted."""
+    """Build a turned mill whose cap is rotated to grind."""
     h, r = height_m, 0.5 * width * height_m
     top = (1 - cap) * h
     profile = [(r, 0.0), (r, 0.18 * h), (waist * r, 0.45 * h), (0.85 * r, top)]

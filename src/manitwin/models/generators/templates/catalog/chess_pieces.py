@@ -1,6 +1,6 @@
-"""Chess pieces in the style of Howard Staunton: turned, on a felt, what is told apart by its head; fronts look towards -Y.
+"""Chess pieces in the Staunton style: turned bodies on felt that differ in their heads; fronts face -Y.
 
-``chess piece`` is the pawn. Heights and the width of the feet: FIDE Handbook C.02, Standards of Chess Equipment 2.2.
+``chess piece`` is the pawn. Heights and foot widths follow the FIDE Handbook C.02, Standards of Chess Equipment 2.2.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _FELT_M = 0.0015
 
 
 def _stand(height_m: float, radius_m: float, waist: float, collar: float) -> Model:
-    """Return a foot with its stem and, at ``collar`` of the height, the ring below the head; ``waist`` is over the foot."""
+    """Return a foot with its stem and the ring below the head, at ``collar`` of the height; ``waist`` is relative to the foot."""
     h, r = height_m, radius_m
     thin, top = waist * r, collar * h
     foot = [(0, 0), (r, 0), (r, 0.05 * h), (0.9 * r, 0.085 * h), (0.94 * r, 0.115 * h), (0.64 * r, 0.17 * h)]
@@ -34,7 +34,7 @@ def _felted(model: Model, radius_m: float) -> Model:
 
 
 def _held(model: Model, height_m: float, radius_m: float, waist: float, collar: float) -> Model:
-    """Note the place of the stem where hands and grippers hold a piece, and lay it on its felt."""
+    """Add a grasp point on the stem, and place the piece on its felt."""
     at = 0.4 * collar * height_m + 0.3 * 0.4 * height_m
     wide = np.interp(at, [0.3 * height_m, 0.75 * collar * height_m], [1.25 * waist * radius_m, waist * radius_m])
     return model.point("body", "surface", "body", (0.0, -float(wide), at), (0.0, -1.0, 0.0)).laid()
@@ -42,7 +42,7 @@ def _held(model: Model, height_m: float, radius_m: float, waist: float, collar: 
 
 @template("chess king")
 def chess_king(*, height_m: float, width: float, crown: float, waist: float, cross: float) -> Model:
-    """Build a king; ``crown`` and ``waist`` are over its foot's width, ``cross`` is the share of its height that is the cross."""
+    """Build a king; ``crown`` and ``waist`` are relative to its foot's width, ``cross`` is the cross's share of the height."""
     h, r, collar = height_m, 0.5 * width * height_m, 0.62
     model, low = _stand(h, r, waist, collar), (1 - cross) * h
     wide, start = crown * r, (collar + 0.005) * h
@@ -66,7 +66,7 @@ def _turned(outline: list[tuple[float, float]], angle_deg: float) -> np.ndarray:
 
 @template("chess queen")
 def chess_queen(*, height_m: float, width: float, crown: float, waist: float) -> Model:
-    """Build a queen: a coronet of eight points and a ball; ``crown`` and ``waist`` are over its foot's width."""
+    """Build a queen with a coronet of eight points and a ball; ``crown`` and ``waist`` are relative to its foot's width."""
     h, r, collar = height_m, 0.5 * width * height_m, 0.66
     model = _stand(h, r, waist, collar)
     wide, start, rim, ball = crown * r, (collar + 0.005) * h, 0.915 * h, 0.035 * h
@@ -92,7 +92,7 @@ def chess_queen(*, height_m: float, width: float, crown: float, waist: float) ->
 
 @template("chess bishop")
 def chess_bishop(*, height_m: float, width: float, mitre: float, waist: float) -> Model:
-    """Build a bishop with the slit of its mitre; ``mitre`` and ``waist`` are over its foot's width."""
+    """Build a bishop with the slit of its mitre; ``mitre`` and ``waist`` are relative to its foot's width."""
     h, r, collar = height_m, 0.5 * width * height_m, 0.62
     model = _stand(h, r, waist, collar)
     wide, start, tip, ball = mitre * r, (collar + 0.005) * h, 0.945 * h, 0.036 * h
@@ -109,7 +109,7 @@ def chess_bishop(*, height_m: float, width: float, mitre: float, waist: float) -
 
 @template("chess rook")
 def chess_rook(*, height_m: float, width: float, tower: float, waist: float) -> Model:
-    """Build a rook: a tower with six battlements; ``tower`` and ``waist`` are its head and its shaft over its foot's width."""
+    """Build a rook with six battlements; ``tower`` and ``waist`` are widths of head and shaft relative to the foot's."""
     h, r = height_m, 0.5 * width * height_m
     wide, thin = tower * r, waist * r
     foot = [(0, 0), (r, 0), (r, 0.075 * h), (0.88 * r, 0.12 * h), (0.92 * r, 0.16 * h), (1.16 * thin, 0.25 * h)]
@@ -135,7 +135,7 @@ def chess_rook(*, height_m: float, width: float, tower: float, waist: float) -> 
 
 @template("chess knight")
 def chess_knight(*, height_m: float, width: float, neck: float, thick: float) -> Model:
-    """Build a knight, a horse's head that looks towards -Y; ``neck`` and ``thick`` are its length and thickness over its foot."""
+    """Build a knight with a horse's head that faces -Y; ``neck`` and ``thick`` are its length and thickness over the foot."""
     h, r = height_m, 0.5 * width * height_m
     foot = [
         (0, 0),
@@ -160,12 +160,12 @@ def chess_knight(*, height_m: float, width: float, neck: float, thick: float) ->
 
 
 def _stood(solid: Manifold) -> Manifold:
-    """Return a solid that is drawn in x and y, its front towards +X, stood up with its front towards -Y."""
+    """Return a solid drawn in x and y with its front towards +X, rotated to stand upright with its front towards -Y."""
     return solid.rotate((90, 0, 0)).rotate((0, 0, -90))
 
 
 def _horse(height_m: float, long_m: float, half_m: float) -> tuple[Manifold, Manifold]:
-    """Return a horse's head with its neck, and its mane: an outline that swells to ``half_m`` on both sides."""
+    """Return a horse's head with its neck, and its mane: a silhouette inflated to ``half_m`` on both sides."""
     h, n = height_m, long_m
     back = arc([(-0.72, 0, 0.15), (-0.82, 0, 0.36), (-0.76, 0, 0.58), (-0.56, 0, 0.78), (-0.24, 0, 0.915)], samples=18)
     face = arc([(0.06, 0, 0.92), (0.38, 0, 0.83), (0.72, 0, 0.715), (0.95, 0, 0.64)], samples=14)
@@ -199,7 +199,7 @@ def _horse(height_m: float, long_m: float, half_m: float) -> tuple[Manifold, Man
 
 
 def _distance_m(points_m: np.ndarray, outline_m: np.ndarray) -> np.ndarray:
-    """Return how far points ``(N, 2)`` are from a closed line ``(K, 2)``."""
+    """Return the distances of points ``(N, 2)`` from a closed polyline ``(K, 2)``, metres."""
     start, step = outline_m, np.roll(outline_m, -1, axis=0) - outline_m
     to = points_m[:, None, :] - start[None]
     along = np.clip(np.einsum("nkj,kj->nk", to, step) / np.einsum("kj,kj->k", step, step), 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Clamps that lie: one that a spring closes, one that a screw does."""
+"""Lying clamps: one closed by a spring, and one closed by a screw."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("clamp")
 def spring_clamp(*, length_m: float, spread: float, thick: float, reach: float) -> Model:
-    """Build a closed spring clamp: jaws with pads towards +X, the handles ``spread`` of the length apart towards -X.
+    """Build a closed spring clamp with padded jaws towards +X and handles towards -X, ``spread`` of the length apart.
 
-    ``thick`` is its thickness and ``reach`` that of the jaws, from the spring to their tips, both over the length.
+    ``thick`` is its thickness and ``reach`` the length of the jaws from the spring to their tips, both relative to the length.
     """
     n, z, end, half = length_m, thick * length_m, 0.5 * length_m, 0.5 * spread * length_m
     joint = end - reach * length_m
@@ -68,9 +68,10 @@ def spring_clamp(*, length_m: float, spread: float, thick: float, reach: float) 
 
 @template("c clamp")
 def c_clamp(*, opening_m: float, throat: float, bar_m: float) -> Model:
-    """Build a clamp lying on its side: the fixed jaw towards +X, the screw along X through the other arm.
+    """Build a clamp lying on its side, with the fixed jaw towards +X and the screw along X through the other arm.
 
-    ``opening_m`` is from jaw to boss, ``throat`` the depth of the frame over it, ``bar_m`` how wide the frame's bar is.
+    ``opening_m`` is the distance from jaw to boss, ``throat`` the depth of the frame relative to it, and ``bar_m`` the width of
+    the frame's bar.
     """
     gap, deep, thick = opening_m, throat * opening_m, 0.8 * bar_m
     right, left = 0.5 * gap, -0.5 * gap

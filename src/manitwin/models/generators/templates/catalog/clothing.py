@@ -1,4 +1,4 @@
-"""What is put on feet and heads, and what it is carried in."""
+"""Clothing for feet and heads, and a suitcase."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from manitwin.geometry.solids.sweep import arc, loft, tube
 from manitwin.models.generators.templates.template import Model, template
 
 _SHARES = np.array([0.0, 0.03, 0.1, 0.25, 0.42, 0.58, 0.72, 0.84, 0.93, 0.98, 1.0])
-"""Of a shoe's length, from the heel."""
+"""Positions along a shoe, relative to its length, from the heel."""
 _WIDTHS = np.array([0.2, 0.5, 0.68, 0.74, 0.78, 0.92, 1.0, 0.94, 0.72, 0.42, 0.12])
 _HEIGHTS = np.array([0.6, 0.86, 1.0, 1.0, 0.92, 0.74, 0.56, 0.44, 0.36, 0.26, 0.12])
 
 
 def _shoe(length_m: float, width_m: float, height_m: float, inset_m: float, low_m: float) -> Manifold:
-    """Return the upper of a shoe, smaller by ``inset_m`` all around, standing on z = ``low_m``, the toe towards +X."""
+    """Return the upper of a shoe, inset by ``inset_m`` on all sides, standing on z = ``low_m`` with the toe towards +X."""
     shares = np.linspace(0, 1, 28)
     x = (-0.5 * length_m + inset_m) + (length_m - 2 * inset_m) * shares
     half = np.maximum(0.5 * width_m * np.interp(shares, _SHARES, _WIDTHS) - inset_m, 0.0015)

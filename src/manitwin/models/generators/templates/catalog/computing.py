@@ -1,4 +1,4 @@
-"""Computers and what is plugged into them: slabs that open, boxes with sockets and lenses, things to play with."""
+"""Computers and accessories: slabs that open, boxes with sockets and lenses, and game controllers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("laptop")
 def laptop(*, length_m: float, width: float, thick_m: float, lean: float) -> Model:
-    """Build an open laptop, its trackpad towards -Y; the screen leans back by ``lean`` of its height."""
+    """Build an open laptop with the trackpad towards -Y; the screen leans back by ``lean`` of its height."""
     deep, lid = width * length_m, 0.4 * thick_m
     model = Model().add("base", prism(rectangle(length_m, deep, radius_m=0.01), thick_m, radius_m=0.0016))
     pad = box(0.32 * length_m, 0.27 * deep, 0.01).translate((0, -0.31 * deep, thick_m - 0.0007))
@@ -111,7 +111,7 @@ def webcam(*, length_m: float, height: float, depth: float, lens: float) -> Mode
 
 @template("charger")
 def charger(*, length_m: float, width: float, thick: float, pins_m: float) -> Model:
-    """Build a plug-in charger lying on a side: its two pins towards +X, its socket towards -X."""
+    """Build a plug-in charger lying on its side, with two pins towards +X and the socket towards -X."""
     long = length_m - pins_m
     across, high = width * long, thick * long
     end = 0.5 * length_m
@@ -128,7 +128,7 @@ def charger(*, length_m: float, width: float, thick: float, pins_m: float) -> Mo
 
 @template("power strip")
 def power_strip(*, length_m: float, width_m: float, thick_m: float, sockets: float) -> Model:
-    """Build a strip of sockets with a switch towards +X and the beginning of its cable towards -X."""
+    """Build a power strip with a switch towards +X and the start of its cable towards -X."""
     count = round(sockets)
     model = Model().add("body", box(length_m, width_m, thick_m, radius_m=0.006))
     pitch = 0.8 * length_m / count

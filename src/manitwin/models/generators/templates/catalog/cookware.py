@@ -1,4 +1,4 @@
-"""What cooks, drains, grates, bakes, toasts and weighs: standing, the front towards -Y, a spout -X and a handle +X."""
+"""Things that cook, drain, grate, bake, toast and weigh, standing with the front to -Y, spouts to -X and handles to +X."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manitwin.models.generators.templates.template import Model, template
 def kettle(*, height_m: float, width: float, waist: float, spout: float, wall_m: float) -> Model:
     """Build a kettle with its lid on and a plastic foot.
 
-    ``waist`` is its upper width over the lower, ``spout`` how far the spout reaches out by a share of the height.
+    ``waist`` is its upper width relative to the lower, ``spout`` the length of the spout relative to the height.
     """
     model, h, r, foot = Model(), 0.86 * height_m, 0.5 * width * height_m, 0.09 * height_m
     side = bulge([(r, 0.0), (0.99 * r, 0.3 * h), (0.5 * (1 + waist) * r, 0.65 * h), (waist * r, h)])
@@ -55,7 +55,7 @@ def kettle(*, height_m: float, width: float, waist: float, spout: float, wall_m:
 
 @template("colander")
 def colander(*, width_m: float, height: float, wall_m: float, ears: float) -> Model:
-    """Build a bowl with holes on a foot ring, two ears along X that reach out by ``ears`` of its width."""
+    """Build a bowl with holes on a foot ring, with two handles along X that protrude by ``ears`` of its width."""
     r, high, model = 0.5 * width_m, height * width_m, Model()
     foot = 0.1 * high
     turn = np.linspace(0.0, np.pi / 2, 14)
@@ -106,9 +106,9 @@ def _colander_holes(r: float, high: float, foot: float) -> Manifold:
 
 @template("grater")
 def grater(*, height_m: float, width: float, depth: float, taper: float) -> Model:
-    """Build a box grater that stands, its coarse face towards -Y: four walls of sheet with holes, a handle on top.
+    """Build a standing box grater with the coarse face towards -Y: four perforated walls of sheet and a handle on top.
 
-    ``width`` and ``depth`` of its foot are shares of the height, ``taper`` the width of its top over that of its foot.
+    ``width`` and ``depth`` of its foot are relative to the height, ``taper`` is the width of its top relative to its foot.
     """
     high, wall, x, y = 0.86 * height_m, 0.0008, 0.5 * width * height_m, 0.5 * depth * height_m
     model = Model().add("body", prism(rectangle(2 * x, 2 * y, radius_m=0.006), high, top=taper), "body")
@@ -161,7 +161,7 @@ def _slots(x: float, y: float, high: float) -> Manifold:
 
 @template("casserole dish")
 def casserole_dish(*, length_m: float, width: float, height_m: float, wall_m: float) -> Model:
-    """Build an oblong baking dish with a lug at each end; ``width`` over its length without them."""
+    """Build an oblong baking dish with a lug at each end; ``width`` is relative to its length without them."""
     across, slope = width * length_m, 1.12
     low = rectangle(length_m / slope, across / slope, radius_m=0.22 * across)
     model = Model().add("body", prism(low, height_m, top=slope), "body")
@@ -181,7 +181,7 @@ def casserole_dish(*, length_m: float, width: float, height_m: float, wall_m: fl
 
 @template("toaster")
 def toaster(*, length_m: float, width: float, height: float) -> Model:
-    """Build a toaster with two slots along X; its lever and its dial are on the end towards +X."""
+    """Build a toaster with two slots along X, and with lever and dial on the end towards +X."""
     deep, high, end = width * length_m, height * length_m, 0.5 * length_m
     foot = 0.012
     model = Model().add("body", box(length_m, deep, high - foot, radius_m=0.16 * high).translate((0, 0, foot)), "body")
@@ -208,7 +208,7 @@ def toaster(*, length_m: float, width: float, height: float) -> Model:
 
 @template("kitchen scale")
 def kitchen_scale(*, length_m: float, width: float, thick_m: float, platform: float) -> Model:
-    """Build a flat scale: its display and two buttons before the platform, which is ``platform`` of the depth."""
+    """Build a flat scale with a display and two buttons before the platform, which takes ``platform`` of the depth."""
     across = width * length_m
     foot, size = 0.003, platform * length_m
     body = prism(rectangle(across, length_m, radius_m=0.016), thick_m - foot, radius_m=0.0045)
@@ -239,7 +239,7 @@ def kitchen_scale(*, length_m: float, width: float, thick_m: float, platform: fl
 
 @template("tea infuser")
 def tea_infuser(*, length_m: float, ball_m: float) -> Model:
-    """Build a perforated ball with a long handle, lying on the ball; tea goes in where its two halves meet."""
+    """Build a perforated ball with a long handle, lying on the ball, which opens at the seam of its two halves."""
     r, end, wall = 0.5 * ball_m, 0.5 * length_m, 0.0009
     at = end - r
     ball = ellipsoid(2 * r, 2 * r, 2 * r)
@@ -256,7 +256,7 @@ def tea_infuser(*, length_m: float, ball_m: float) -> Model:
 
 
 def _infuser_holes(r: float) -> Manifold:
-    """Return pins from the middle of a ball of radius ``r`` all around, but for its seam and where the handle begins."""
+    """Return radial pins from the centre of a ball of radius ``r``, except at its seam and at the root of the handle."""
     count, holes = 90, []
     for number in range(count):
         z = 1 - 2 * (number + 0.5) / count
@@ -271,7 +271,7 @@ def _infuser_holes(r: float) -> Manifold:
 
 @template("baking tray")
 def baking_tray(*, length_m: float, width: float, height: float, lip: float) -> Model:
-    """Build a tray of sheet with flaring walls and a flat ``lip`` all around, a share of the length."""
+    """Build a sheet tray with flaring walls and a flat ``lip`` all around, relative to the length."""
     sheet, flare, across, high, edge = 0.0012, 0.9, width * length_m, height * length_m, lip * length_m
     long, wide = length_m - 2 * edge, across - 2 * edge
     corner, top = 0.06 * wide, high - 1.5 * sheet

@@ -1,4 +1,4 @@
-"""What is painted, sprayed and put on: small closed things that stand, the front towards -Y."""
+"""Cosmetics: small closed containers that stand with the front towards -Y."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("lipstick")
 def lipstick(*, height_m: float, width: float, case: float, stick: float) -> Model:
-    """Build an open lipstick: a ``case``, a narrower sleeve and a ``stick`` that is cut off aslant, shares of the height."""
+    """Build an open lipstick: a ``case``, a narrower sleeve and an obliquely cut ``stick``, as shares of the height."""
     h, r = height_m, 0.5 * width * height_m
     low, high = case * h, (1 - stick) * h
     model = Model().add("case", lathe(rounded([(0.0, 0.0), (r, 0.0), (r, low), (0.0, low)], 0.001)))
@@ -24,7 +24,10 @@ def lipstick(*, height_m: float, width: float, case: float, stick: float) -> Mod
 
 @template("nail polish bottle")
 def nail_polish_bottle(*, height_m: float, width: float, body: float, cap: float) -> Model:
-    """Build a short bottle with a long, slim cap that holds the brush; ``body`` over the height, ``cap`` over the width."""
+    """Build a short bottle with a long, slim cap.
+
+    ``body`` is relative to the height, ``cap`` to the width.
+    """
     h, r = height_m, 0.5 * width * height_m
     top, c = body * h, cap * 0.5 * width * height_m
     neck = 0.06 * h
@@ -39,7 +42,7 @@ def nail_polish_bottle(*, height_m: float, width: float, body: float, cap: float
 
 @template("perfume bottle")
 def perfume_bottle(*, height_m: float, width: float, depth: float, body: float, cap: float) -> Model:
-    """Build a flat flask of glass with a cap on top; ``depth`` and ``cap`` over the width, the rest over the height."""
+    """Build a flat glass flask with a cap; ``depth`` and ``cap`` are relative to the width, the rest to the height."""
     h, wide = height_m, width * height_m
     deep, top = depth * wide, body * h
     model = Model().add("body", prism(rectangle(wide, deep, radius_m=0.16 * deep), top, radius_m=0.06 * deep))

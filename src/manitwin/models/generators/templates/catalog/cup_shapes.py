@@ -1,4 +1,4 @@
-"""What cups for tea and coffee have in common: a side that swells from a foot to a lip, and an ear like a question mark."""
+"""Common shapes of cups for tea and coffee: a side that widens from a foot to a lip, and a handle like a question mark."""
 
 from __future__ import annotations
 
@@ -12,24 +12,27 @@ from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.template import Model
 
 RING = 0.05
-"""Of the height: the ring below the rounded bottom that a cup stands on."""
+"""Height of the ring below the rounded bottom on which a cup stands, relative to the cup's height."""
 EAR_SHARE = 0.08
-"""Of a cup's width: how thick its ear is."""
+"""Thickness of the handle relative to the cup's width."""
 HIGHEST_JOIN = 0.6
-"""Of the height: an ear that joins higher leaves no room for a finger."""
-_NECK = 0.94  # of the foot's radius: the ring's upper end, where the bottom begins
-_UNDERSIDE, _SIDE = 10, 12  # points of the profile below its widest place and above
+"""Largest relative height of the handle's lower end; a handle that joins higher leaves no room for a finger."""
+_NECK = 0.94  # of the foot's radius: the upper end of the ring, where the bottom begins
+_UNDERSIDE, _SIDE = 10, 12  # points of the profile below and above the widest point
 _LEVELS = 24
-_FLARED_FROM = 4  # power of the share of the way up: half of the flare is in the upper tenth of the height
-_EAR_TOP = 0.87  # of the height: where the ear leaves the wall
-_LEAST_JOIN = 0.15  # of the height: what joins lower would stand beside the foot
-_EMBEDDED = 1.5  # of the wall: how deep the ear's ends begin in it, so that they meet a slanted one all around
+_FLARED_FROM = 4  # power of the relative height: half of the flare is in the upper tenth
+_EAR_TOP = 0.87  # of the height: upper end of the handle at the wall
+_LEAST_JOIN = 0.15  # of the height: lower handles would touch the ground beside the foot
+_EMBEDDED = 1.5  # of the wall: depth of the handle's ends in it, to join a slanted wall all around
 
 
 @dataclass(frozen=True)
 class CupSide:
-    """The side of a cup: rim's radius and height, the ``wide`` radius of its lower half and the height of that (``belly``), its
-    foot's radius, and how far its lip leans out (``lip``); all in metres."""
+    """The side of a cup, in metres.
+
+    Given are the rim's radius and height, the largest radius ``wide`` of the lower half and its height ``belly``, the foot's
+    radius, and the outward lean of the lip (``lip``).
+    """
 
     radius_m: float
     height_m: float
@@ -41,33 +44,33 @@ class CupSide:
 
     @property
     def floor_m(self) -> float:
-        """The height of its floor inside: the ring and a wall."""
+        """Height of the inner floor: the ring plus one wall thickness."""
         return RING * self.height_m + self.wall_m
 
     def profile(self, *, underside: int = _UNDERSIDE, side: int = _SIDE) -> list[Point]:
-        """Return (radius, z) counted upward: a ring, a quarter of an ellipse to the widest place, and a side with its lip."""
+        """Return (radius, z) from bottom to top: a ring, a quarter ellipse to the widest point, and a side with its lip."""
         ring, neck = RING * self.height_m, _NECK * self.foot_m
         belly = max(self.belly_m, 2 * ring)
         turn = np.linspace(0.0, np.pi / 2, underside)
         up = np.linspace(0.0, 1.0, side)[1:]
         lower = neck + (self.wide_m - neck) * np.sin(turn), ring + (belly - ring) * (1 - np.cos(turn))
         below_lip = self.radius_m - self.lip_m
-        # upright where it is widest, at the mean slope of the side below its lip
+        # Vertical at the widest point, then the mean slope of the side below its lip.
         radii = self.wide_m + (below_lip - self.wide_m) * (2 - up) * up**2 + self.lip_m * up**_FLARED_FROM
         upper = radii, belly + (self.height_m - belly) * up
         points = np.concatenate([np.stack(lower, 1), np.stack(upper, 1)])
         return [(self.foot_m, 0.0), *((max(float(radius), 1e-4), float(z)) for radius, z in points)]
 
     def radius_at(self, z_m: float) -> float:
-        """Return the radius at a height."""
+        """Return the radius at a height, metres."""
         radii, heights = np.array(self.profile()).T
         return float(np.interp(z_m, heights, radii))
 
     def solids(self) -> tuple[Manifold, Manifold]:
-        """Return the outer solid, and what is cut out of it to leave a wall that is everywhere as thick."""
+        """Return the outer solid, and the solid to subtract from it so that the wall has the same thickness everywhere."""
         radii, heights = np.array(self.profile(underside=8 * _UNDERSIDE, side=8 * _SIDE)).T
         levels = np.linspace(self.floor_m, self.height_m, _LEVELS)
-        # all that is a wall's thickness away from the profile: balls about its points, cut at each level
+        # All points one wall thickness away from the profile: balls about its points, cut at each level.
         within = self.wall_m**2 - (heights[None] - levels[:, None]) ** 2
         inner = np.where(within >= 0, radii[None] - np.sqrt(np.maximum(within, 0.0)), np.inf).min(axis=1)
         hollow = [(max(float(r), 0.2 * self.wall_m), float(z)) for r, z in zip(inner, levels, strict=True)]
@@ -78,10 +81,10 @@ class CupSide:
 def cup_ear(
     model: Model, side: CupSide, *, reach_m: float, join: float, hook: float, thick_m: float
 ) -> tuple[str, Manifold]:
-    """Return an ear towards +X from near the rim down to ``join`` of the height, and note its outermost place.
+    """Return a handle towards +X from near the rim down to ``join`` of the height, and add a point at its outermost place.
 
-    ``hook`` is 0 for an even arc and 1 for a question mark, whose lower half runs back to the wall at a slant. ``reach_m`` is
-    how far it stands out.
+    ``hook`` is 0 for an even arc and 1 for a question mark, whose lower half returns to the wall obliquely. ``reach_m`` is how
+    far the handle protrudes.
     """
     high, low = _EAR_TOP * side.height_m, max(join, _LEAST_JOIN) * side.height_m
     span, bend = high - low, float(np.clip(hook, 0.0, 1.2))

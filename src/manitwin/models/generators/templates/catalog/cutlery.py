@@ -1,4 +1,4 @@
-"""Cutlery and cooking tools: lying as they are put down, the working end towards +X."""
+"""Cutlery and cooking tools, lying with the working end towards +X."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manitwin.models.generators.templates.resting import rested
 from manitwin.models.generators.templates.template import Model, template
 
 SPOON_NECK_HALF_M, FORK_NECK_HALF_M = 0.0042, 0.0045
-"""Half the width of a handle where it meets the bowl or the tines."""
+"""Half the width of a handle where it meets the bowl or the tines, metres."""
 
 
 def slim(
@@ -24,9 +24,9 @@ def slim(
     lift_m: float = 0.0,
     arch_m: float = 0.0,
 ) -> Manifold:
-    """Return a handle along X from ``start_m`` down to ``end_m``, broader by ``wide_end`` and raised by ``lift_m`` at its end.
+    """Return a handle along X from ``start_m`` down to ``end_m``, widened by ``wide_end`` and raised by ``lift_m`` at its end.
 
-    Its middle is higher by ``arch_m`` besides.
+    Its middle is raised by a further ``arch_m``.
     """
     along = np.linspace(0.0, 1.0, 24)
     tip = np.minimum(1.0, np.sqrt(np.clip((1 - along) / 0.06, 0.03, 1.0)))
@@ -36,12 +36,12 @@ def slim(
 
 
 def arched(arch: float, length_m: float) -> float:
-    """Return how much higher the middle of a handle is than its ends: -0.03 to 0.07 of the length, straight at 0.3."""
+    """Return the height of a handle's middle above its ends: -0.03 to 0.07 of the length, and 0 for ``arch`` = 0.3."""
     return 0.1 * (arch - 0.3) * length_m
 
 
 def scoop(long_m: float, wide_m: float, deep_m: float, wall_m: float) -> tuple[Manifold, Manifold]:
-    """Return the lower half of an ellipsoid about the origin, and what hollows it."""
+    """Return the lower half of an ellipsoid about the origin, and the solid that hollows it."""
     lower = box(2 * long_m, 2 * wide_m, 2 * deep_m).translate((0, 0, -2 * deep_m))
     inner = ellipsoid(long_m - 2 * wall_m, wide_m - 2 * wall_m, 2 * deep_m - 2 * wall_m)
     return ellipsoid(long_m, wide_m, 2 * deep_m) ^ lower, inner
@@ -81,8 +81,9 @@ def _spoon(
 def spoon(*, length_m: float, bowl: float, width_m: float, grip: float, arch: float, end: float) -> Model:
     """Build a spoon lying on its bowl.
 
-    ``grip`` is the width of its handle's end over the length; ``arch`` bends the handle, whose middle is below the line of its
-    ends at 0 and above it at 1 (``arched``); ``end`` is how much higher its end is than the bowl's edge over the bowl's depth.
+    ``grip`` is the width of the handle's end relative to the length. ``arch`` bends the handle: its middle is below the line
+    through its ends at 0 and above it at 1 (``arched``). ``end`` is the height of the handle's end above the edge of the bowl,
+    relative to the bowl's depth.
     """
     wide_end = 0.5 * grip * length_m / SPOON_NECK_HALF_M
     arch_m = arched(arch, length_m)
@@ -99,13 +100,13 @@ def ladle(*, length_m: float, bowl: float, width_m: float) -> Model:
 
 @template("cooking spoon")
 def cooking_spoon(*, length_m: float, bowl: float, width_m: float) -> Model:
-    """Build a wooden spoon with a shallow bowl, a thick wall and a nearly round handle, as wood asks for."""
+    """Build a wooden spoon with a shallow bowl, a thick wall and a nearly round handle."""
     return _spoon(length_m, bowl, width_m, 0.2, 0.0055, 0.004, 0.5, flatten=0.8)
 
 
 @template("fork")
 def fork(*, length_m: float, head: float, width_m: float, grip: float, arch: float) -> Model:
-    """Build a fork with four tines, their points raised; ``grip`` and ``arch`` are those of a ``spoon``."""
+    """Build a fork with four tines and raised points; ``grip`` and ``arch`` are those of a ``spoon``."""
     long = head * length_m
     start, thick, gap = 0.5 * length_m - long, 0.002, 0.13 * width_m
     outline = [(start, -0.11 * width_m), (start + 0.3 * long, -0.5 * width_m), (0.5 * length_m, -0.46 * width_m)]
@@ -146,7 +147,7 @@ def fork(*, length_m: float, head: float, width_m: float, grip: float, arch: flo
 
 
 def _knife(length_m: float, blade: float, width_m: float, back_m: float, handle_half_m: float, belly: float) -> Model:
-    """Build a knife lying on its side, the edge towards -Y."""
+    """Build a knife lying on its side, with the edge towards -Y."""
     long, start = blade * length_m, (0.5 - blade) * length_m
     x = np.linspace(0.0, 1.0, 20)
     edge = -0.5 * width_m * (1 - belly * x**3)
@@ -187,7 +188,7 @@ def _knife(length_m: float, blade: float, width_m: float, back_m: float, handle_
 
 @template("chef's knife")
 def chefs_knife(*, length_m: float, blade: float, width_m: float, back_m: float) -> Model:
-    """Build a chef's knife: ``blade`` is its blade's share of the length, ``back_m`` the thickness of its back."""
+    """Build a chef's knife: ``blade`` is the blade's share of the length, ``back_m`` the thickness of its spine."""
     return _knife(length_m, blade, width_m, back_m, 0.0115, 0.75)
 
 
@@ -207,8 +208,8 @@ def table_knife(*, length_m: float, blade: float, width_m: float, back_m: float)
 def spatula(*, length_m: float, head: float, width_m: float, rise: float, crank: float, grip: float) -> Model:
     """Build a slotted turner whose handle rises from its blade.
 
-    ``rise`` is the height of the handle's end over the length, ``crank`` the share of it that the neck rises by, close to the
-    blade, and ``grip`` the width of the handle's end over the length.
+    ``rise`` is the height of the handle's end relative to the length, ``crank`` the share of it by which the neck rises near the
+    blade, and ``grip`` the width of the handle's end relative to the length.
     """
     long = head * length_m
     at = 0.5 * (length_m - long)

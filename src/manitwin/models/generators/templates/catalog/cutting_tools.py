@@ -1,4 +1,4 @@
-"""Tools that cut, turn and pry: lying as they are put down, the working end towards +X; a drill stands on its battery."""
+"""Tools that cut, turn and pry, lying with the working end towards +X; a drill stands on its battery."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 
 def oval(x_m: float, y_m: float) -> CrossSection:
-    """Return an ellipse with these half axes about the origin."""
+    """Return an ellipse about the origin with these half axes."""
     return CrossSection.circle(1.0, chords(48)).scale((x_m, y_m))
 
 
@@ -27,11 +27,11 @@ def scissors(
     offset: float,
     gape: float,
 ) -> Model:
-    """Build scissors whose blades are ``gape`` (rad) apart: ``blade`` of the length lies before the screw.
+    """Build scissors whose blades are opened by ``gape`` (rad); ``blade`` of the length lies in front of the screw.
 
-    ``broad`` is a blade's width and ``ring`` a finger ring's over the length. The ring towards +Y is for the fingers,
-    ``fingers`` of what is behind the screw long; the round one is the thumb's, which ends before it by the share ``thumb``.
-    Both are moved to the thumb's side by the share ``offset`` of a ring.
+    ``broad`` is a blade's width and ``ring`` a finger ring's width, relative to the length. The ring towards +Y is for the
+    fingers and takes ``fingers`` of the length behind the screw. The round ring is for the thumb and ends earlier by the share
+    ``thumb``. Both are shifted to the thumb's side by the share ``offset`` of a ring.
     """
     long, back, wide, thick = blade * length_m, (1 - blade) * length_m, broad * length_m, 0.0125 * length_m
     at, half, band, high = 0.5 * length_m - long, 0.5 * ring * length_m, 0.038 * length_m, 0.05 * length_m
@@ -67,9 +67,9 @@ def scissors(
 
 @template("saw")
 def saw(*, length_m: float, width: float, grip: float) -> Model:
-    """Build a hand saw lying on its side, its teeth towards -Y; ``width`` is the blade's at the handle over the length.
+    """Build a hand saw lying on its side with its teeth towards -Y; ``width`` is the blade's width at the handle over the length.
 
-    ``grip`` is the share of the length of its handle, which has a hole for the hand.
+    ``grip`` is the share of the handle in the length; the handle has a hole for the hand.
     """
     reach, wide, thick = grip * length_m, width * length_m, 0.0011
     start, end = reach - 0.5 * length_m, 0.5 * length_m
@@ -97,10 +97,10 @@ def saw(*, length_m: float, width: float, grip: float) -> Model:
 
 @template("drill")
 def drill(*, length_m: float, height: float, body: float, battery: float, pack: float, bit: float) -> Model:
-    """Build a cordless drill that stands on its battery, its bit towards +X.
+    """Build a cordless drill that stands on its battery, with the bit towards +X.
 
-    ``bit`` is the share of the length that the bit sticks out; ``height``, the housing's diameter ``body`` and the battery's
-    length and height ``pack`` are shares of the rest.
+    ``bit`` is the share of the length by which the bit protrudes. ``height``, the housing's diameter ``body``, and the battery's
+    length ``battery`` and height ``pack`` are relative to the rest.
     """
     long = (1 - bit) * length_m
     high, r, low = height * long, 0.5 * body * long, pack * long
@@ -145,7 +145,7 @@ def drill(*, length_m: float, height: float, body: float, battery: float, pack: 
 
 @template("utility knife")
 def utility_knife(*, length_m: float, blade: float, width_m: float) -> Model:
-    """Build a knife with a blade that is pushed out towards +X by ``blade`` of the length, its edge towards -Y."""
+    """Build a knife whose blade is pushed out towards +X by ``blade`` of the length, with the edge towards -Y."""
     start, w, thick = (0.5 - blade) * length_m, width_m, 0.5 * width_m
     end, back = 0.5 * length_m, -0.5 * length_m
     side = [(back, -0.5), (back, 0.4), (back + 0.03, 0.5), (start - 0.02, 0.42), (start, 0.38), (start - 0.014, -0.42)]
@@ -168,9 +168,9 @@ def utility_knife(*, length_m: float, blade: float, width_m: float) -> Model:
 
 @template("crowbar")
 def crowbar(*, length_m: float, thick_m: float, hook: float) -> Model:
-    """Build a crowbar lying on its side: a hook with a claw towards +X, a bent chisel towards -X.
+    """Build a crowbar lying on its side, with a hooked claw towards +X and a bent chisel towards -X.
 
-    ``hook`` is the hook's diameter over the length.
+    ``hook`` is the hook's diameter relative to the length.
     """
     half, r, end = 0.5 * thick_m, 0.5 * hook * length_m, 0.5 * length_m
     turn = np.linspace(-0.5 * np.pi, 0.72 * np.pi, 22)
@@ -202,7 +202,9 @@ def crowbar(*, length_m: float, thick_m: float, hook: float) -> Model:
 
 @template("screw")
 def screw(*, length_m: float, width: float, head: float) -> Model:
-    """Build a wood screw lying with its point towards +X: ``width`` of its thread over the length, ``head`` over the thread's."""
+    """Build a lying wood screw with its point towards +X; ``width`` of the thread is relative to the length, ``head`` to the
+    thread.
+    """
     r, end = 0.5 * width * length_m, 0.5 * length_m
     top, turns = head * r, 16
     sink = 0.9 * (top - 0.7 * r)

@@ -1,4 +1,4 @@
-"""Things of a desk: to write, measure, fix and bind with."""
+"""Desk items to write, measure, fix and bind with."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from manitwin.models.generators.templates.template import Model, template
 
 
 def _lying(profile: list[Point], sides: int = 32) -> Manifold:
-    """Return a turned solid whose axis lies along X."""
+    """Return a solid of revolution whose axis lies along X."""
     return lathe(profile, sides=sides).rotate((0, 90, 0))
 
 
 @template("pen")
 def pen(*, length_m: float, thick_m: float, tip: float) -> Model:
-    """Build a pen with a push button and a clip; its tip towards +X."""
+    """Build a pen with a push button and a clip, and with its tip towards +X."""
     end, r = 0.5 * length_m, 0.5 * thick_m
     start = end - tip * length_m
     model = Model().add(
@@ -36,7 +36,7 @@ def pen(*, length_m: float, thick_m: float, tip: float) -> Model:
 
 @template("pencil")
 def pencil(*, length_m: float, thick_m: float) -> Model:
-    """Build a hexagonal pencil with an eraser; its point towards +X."""
+    """Build a hexagonal pencil with an eraser, and with its point towards +X."""
     end, r = 0.5 * length_m, 0.5 * thick_m
     start = end - 0.022
     model = Model().add(
@@ -48,7 +48,7 @@ def pencil(*, length_m: float, thick_m: float) -> Model:
         "wood",
     )
     model.region("lead", "wood", lambda centers: centers[:, 0] > end - 0.006, "lead")
-    # wider than the corners of the barrel, which would pierce it
+    # Wider than the corners of the barrel, which would otherwise pierce it.
     model.add("ferrule", cylinder(1.005 * r, 0.012).rotate((0, 90, 0)).translate((-end + 0.004, 0, 0)), "lead")
     model.add("eraser", cylinder(0.9 * r, 0.006).rotate((0, 90, 0)).translate((-end, 0, 0)), "eraser")
     model.point("point", "tip", "lead", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
@@ -174,7 +174,7 @@ def stapler(*, length_m: float, height: float, width_m: float) -> Model:
 
 @template("tape dispenser")
 def tape_dispenser(*, length_m: float, height: float, width_m: float) -> Model:
-    """Build a desk dispenser with its roll, the cutter towards +X."""
+    """Build a desk dispenser with its roll, and with the cutter towards +X."""
     h, x = height * length_m, 0.5 * length_m
     side = polygon(
         [

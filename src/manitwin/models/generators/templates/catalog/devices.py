@@ -1,4 +1,4 @@
-"""Electronics: slabs and boxes with screens, buttons and lenses; the face up where they lie, towards -Y where they stand."""
+"""Electronics: slabs and boxes with screens, buttons and lenses; faces point up if they lie and to -Y if they stand."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from manitwin.models.generators.templates.template import Model, template
 
 
 def slab(model: Model, x_m: float, y_m: float, z_m: float, *, corner_m: float = 0.008, edge_m: float = 0.002) -> Model:
-    """Add a ``body`` that lies flat, its corners rounded by ``corner_m`` seen from above and its edges by ``edge_m``."""
+    """Add a lying ``body`` with corners rounded by ``corner_m`` in plan view and edges rounded by ``edge_m``."""
     return model.add("body", prism(rectangle(x_m, y_m, radius_m=corner_m), z_m, radius_m=min(edge_m, 0.45 * z_m)))
 
 
 @template("mobile phone")
 @template("tablet")
 def screened(*, length_m: float, width: float, thick_m: float, border: float) -> Model:
-    """Build a phone or a tablet on its back, its screen up."""
+    """Build a phone or a tablet on its back, with the screen up."""
     across = width * length_m
     model = slab(Model(), length_m, across, thick_m)
     edge = 2 * border * across
@@ -34,7 +34,7 @@ def screened(*, length_m: float, width: float, thick_m: float, border: float) ->
 
 @template("remote control")
 def remote_control(*, length_m: float, width: float, thick_m: float, rows: float) -> Model:
-    """Build a remote with rows of buttons; its end towards +X points at the device."""
+    """Build a remote control with rows of buttons; the end towards +X points at the device."""
     across, count = width * length_m, round(rows)
     model = slab(Model(), length_m, across, thick_m, corner_m=0.01, edge_m=0.006)
     pitch = 0.66 * length_m / count
@@ -61,7 +61,7 @@ def remote_control(*, length_m: float, width: float, thick_m: float, rows: float
 
 @template("computer mouse")
 def computer_mouse(*, length_m: float, width: float, height: float) -> Model:
-    """Build a mouse: buttons and wheel towards +X."""
+    """Build a mouse with buttons and wheel towards +X."""
     across, high = width * length_m, height * length_m
     half = box(2 * length_m, 2 * length_m, 2 * length_m)
     body = ellipsoid(length_m, across, 2 * high) ^ half
@@ -189,7 +189,7 @@ def camera(*, length_m: float, height: float, depth: float, lens: float) -> Mode
 
 @template("headphones")
 def headphones(*, width_m: float, height: float, cup_m: float) -> Model:
-    """Build headphones that stand on their cups, the band an arch over X."""
+    """Build headphones that stand on their cups, with the headband as an arch above X."""
     half, top = 0.5 * width_m, height * width_m
     path = arc(
         [
@@ -245,7 +245,7 @@ def electric_toothbrush(*, height_m: float, width: float, head: float) -> Model:
 
 @template("hair dryer")
 def hair_dryer(*, length_m: float, barrel: float, grip: float) -> Model:
-    """Build a dryer lying on its side: it blows towards +X, its grip is towards -Y."""
+    """Build a dryer lying on its side, with the outlet towards +X and the grip towards -Y."""
     r, reach = 0.5 * barrel * length_m, grip * length_m
     profile = rounded(
         [
@@ -278,7 +278,7 @@ def hair_dryer(*, length_m: float, barrel: float, grip: float) -> Model:
 
 @template("router")
 def router(*, length_m: float, width: float, thick_m: float, aerial: float) -> Model:
-    """Build a router with two aerials at its back (+Y)."""
+    """Build a router with two antennas at its back (+Y)."""
     across = width * length_m
     model = slab(Model(), length_m, across, thick_m, corner_m=0.012, edge_m=0.004)
     for side in (-1.0, 1.0):

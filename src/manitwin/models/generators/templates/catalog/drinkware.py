@@ -1,4 +1,4 @@
-"""Bottles, mugs and jugs to drink and pour from on the way, in the nursery and at the table: standing on their bases."""
+"""Bottles, mugs and jugs for travel, babies and the table, standing on their bases."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("baby bottle")
 def baby_bottle(*, height_m: float, width: float, body: float, collar: float) -> Model:
-    """Build a filled bottle with a screwed ``collar`` and a teat; ``width``, ``body`` and ``collar`` over the height."""
+    """Build a filled bottle with a screwed ``collar`` and a teat; all ratios are relative to the height."""
     h, r = height_m, 0.5 * width * height_m
     top, ring = body * h, (body + collar) * h
     model = Model().add("body", lathe(rounded([(0.0, 0.0), (r, 0.0), (r, 0.86 * top), (0.82 * r, top)], 0.12 * r)))
@@ -28,7 +28,7 @@ def baby_bottle(*, height_m: float, width: float, body: float, collar: float) ->
 
 @template("travel mug")
 def travel_mug(*, height_m: float, width: float, foot: float, lid: float) -> Model:
-    """Build a closed mug that is narrower at its ``foot``, with a ``lid`` to drink through."""
+    """Build a closed mug that narrows towards its ``foot``, with a ``lid`` to drink through."""
     h, r = height_m, 0.5 * width * height_m
     top = (1 - lid) * h
     model = Model().add("body", lathe(rounded([(0.0, 0.0), (foot * r, 0.0), (0.985 * r, top), (0.0, top)], 0.005)))
@@ -46,7 +46,7 @@ def travel_mug(*, height_m: float, width: float, foot: float, lid: float) -> Mod
 
 @template("carafe")
 def carafe(*, height_m: float, width: float, neck: float, flare: float, wall_m: float) -> Model:
-    """Build an open jug without a handle: broad below, drawn in to a ``neck`` and wider by ``flare`` at its rim."""
+    """Build an open jug without a handle: broad below, narrowed to a ``neck``, and widened by ``flare`` at its rim."""
     h, r = height_m, 0.5 * width * height_m
     n = neck * r
     profile = bulge([(0.8 * r, 0.0), (r, 0.2 * h), (0.86 * r, 0.45 * h), (n, 0.74 * h), (flare * n, h)])
@@ -67,11 +67,12 @@ def tea_cup(
     hook: float,
     wall_m: float,
 ) -> Model:
-    """Build a cup with an ear, its bottom round, its lip leaning outward.
+    """Build a cup with a handle, a round bottom, and a lip that leans outward.
 
-    ``rim`` is its height over its width; ``belly`` the radius where its bottom ends over the rim's, and ``bottom`` the height of
-    that over the whole; ``taper`` its foot and ``flare`` the lip's lean over the rim's radius; ``handle`` how far the ear reaches
-    out and ``join`` where it comes back to the wall, over the height; ``hook`` is 0 for an even ear, 1 for a question mark.
+    ``rim`` is the height relative to the width. ``belly`` is the radius where the bottom ends relative to the rim's, and
+    ``bottom`` the relative height of that. ``taper`` of the foot and ``flare`` of the lip are relative to the rim's radius.
+    ``handle`` is how far the handle protrudes and ``join`` where it returns to the wall, relative to the height. ``hook`` is 0
+    for an even arc and 1 for a question mark.
     """
     model, radius, height = Model(), 0.5 * width_m, rim * width_m
     side = CupSide(radius, height, belly * radius, bottom * height, taper * radius, flare * radius, wall_m)
@@ -81,7 +82,7 @@ def tea_cup(
 
 @template("ramekin")
 def ramekin(*, width_m: float, height: float, taper: float, wall_m: float) -> Model:
-    """Build a small baking dish with grooved, nearly straight walls; ``taper`` is its foot over its rim."""
+    """Build a small baking dish with grooved, nearly straight walls; ``taper`` is the foot's width relative to the rim's."""
     r, high = 0.5 * width_m, height * width_m
     model = hollowed(Model(), [(taper * r, 0.0), (r, high)], wall_m, 1.4 * wall_m)
     pitch = 2 * np.pi * r / 40
