@@ -142,7 +142,7 @@ def billiard_ball(*, width_m: float, spot: float) -> Model:
 def bowling_ball(*, width_m: float, hole: float, span: float) -> Model:
     """Build a bowling ball with its holes near the top.
 
-    ``hole`` is a hole's width and ``span`` the distance from fingers to thumb, both relative to the ball's width.
+    ``hole`` is a hole's width and ``span`` the arc length from fingers to thumb, both relative to the ball's width.
     """
     r, radius_m = 0.5 * width_m, 0.5 * hole * width_m
     drill = cylinder(radius_m, r).translate((0, 0, 0.55 * r))

@@ -1,4 +1,4 @@
-"""Small parts of machines and of workshops: nails, rods, pipes, bearings, pulleys, springs, hinges. What is long lies along X."""
+"""Small machine and workshop parts: nails, rods, pipes, bearings, pulleys, springs, hinges. Long ones lie along X."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("nail")
 def nail(*, length_m: float, width: float, head: float) -> Model:
-    """Build a nail lying, its tip towards +X; ``width`` is its shank's over its length, ``head`` that one's over the shank's."""
+    """Build a lying nail with its tip towards +X; ``width`` of the shank is relative to the length, ``head`` to the shank."""
     r, end = 0.5 * width * length_m, 0.5 * length_m
     shank = [(r, -end + 0.8 * r), (r, end - 4.4 * r), (0.12 * r, end)]
     model = Model().add("shank", lying(lathe([(0, -end + 0.8 * r), *shank, (0, end)], sides=chords(20))))
@@ -38,7 +38,7 @@ def nail(*, length_m: float, width: float, head: float) -> Model:
 
 
 def _rod(model: Model, length_m: float, radius_m: float) -> Model:
-    """Note both ends and the middle of what is long and round and lies along X."""
+    """Add points at both ends and in the middle of a round rod along X."""
     end = 0.5 * length_m
     model.point("end", "surface", "body", (end - 0.001, 0.0, radius_m), (0.0, 0.0, 1.0))
     model.point("middle", "surface", "body", (0.0, 0.0, radius_m), (0.0, 0.0, 1.0))
@@ -47,7 +47,7 @@ def _rod(model: Model, length_m: float, radius_m: float) -> Model:
 
 @template("dowel")
 def dowel(*, length_m: float, width_m: float, grooves: float) -> Model:
-    """Build a dowel with bevelled ends, lying; ``grooves`` run along it (0: it is smooth)."""
+    """Build a lying dowel with bevelled ends; ``grooves`` is the number of grooves along it (0 for a smooth one)."""
     r, end = 0.5 * width_m, 0.5 * length_m
     bevel = 0.25 * r
     body = lathe(
@@ -63,7 +63,7 @@ def dowel(*, length_m: float, width_m: float, grooves: float) -> Model:
 
 @template("pipe")
 def pipe(*, length_m: float, width_m: float, wall: float) -> Model:
-    """Build a piece of pipe lying; ``wall`` is its wall's thickness over its width."""
+    """Build a lying piece of pipe; ``wall`` is the wall thickness relative to the width."""
     r = 0.5 * width_m
     body = lying(cylinder(r, length_m, sides=chords(48))).translate((-0.5 * length_m, 0, 0))
     hole = lying(cylinder((0.5 - wall) * width_m, 2 * length_m, sides=chords(48))).translate((-length_m, 0, 0))
@@ -72,7 +72,7 @@ def pipe(*, length_m: float, width_m: float, wall: float) -> Model:
 
 @template("bearing")
 def bearing(*, width_m: float, bore: float, height: float, seal: float) -> Model:
-    """Build a ball bearing lying; ``bore`` and ``height`` are over its width, ``seal`` is how deep its seals lie."""
+    """Build a lying ball bearing; ``bore`` and ``height`` are relative to the width, ``seal`` is the depth of its seals."""
     r, inner, h = 0.5 * width_m, 0.5 * bore * width_m, height * width_m
     step = 0.22 * (r - inner)
     edge = 0.04 * (r - inner)
@@ -88,7 +88,7 @@ def bearing(*, width_m: float, bore: float, height: float, seal: float) -> Model
 
 @template("pulley")
 def pulley(*, width_m: float, bore: float, height: float, groove: float) -> Model:
-    """Build a grooved wheel lying, holes through its web; ``groove`` is how deep it is cut, of the radius."""
+    """Build a lying grooved wheel with holes in its web; ``groove`` is the depth of the groove relative to the radius."""
     r, inner, h = 0.5 * width_m, 0.5 * bore * width_m, height * width_m
     low = (1 - groove) * r
     side = [
@@ -114,7 +114,7 @@ def pulley(*, width_m: float, bore: float, height: float, groove: float) -> Mode
 
 @template("spring")
 def spring(*, length_m: float, width: float, wire: float, turns: float) -> Model:
-    """Build a coil spring lying, its ends closed; ``width`` is over its length, ``wire`` over its width."""
+    """Build a lying coil spring with closed ends; ``width`` is relative to the length, ``wire`` to the width."""
     t = 0.5 * wire * width * length_m
     r, count = 0.5 * width * length_m - t, round(turns)
     share = np.linspace(0.0, 1.0, 26 * count + 1)
@@ -133,7 +133,7 @@ def spring(*, length_m: float, width: float, wire: float, turns: float) -> Model
 
 @template("hinge")
 def hinge(*, height_m: float, width: float, thick_m: float, pin_m: float) -> Model:
-    """Build a hinge lying open, three holes in each leaf; ``width`` is that of both leaves over its height."""
+    """Build an open lying hinge with three holes in each leaf; ``width`` is that of both leaves relative to the height."""
     w, r = 0.5 * width * height_m, 0.5 * pin_m
     leaf = prism(rectangle(w, height_m, radius_m=0.05 * height_m), thick_m).translate((0.5 * w + 0.4 * r, 0, -r))
     model = Model().add("body", leaf + leaf.mirror((1, 0, 0)))
@@ -159,7 +159,7 @@ def hinge(*, height_m: float, width: float, thick_m: float, pin_m: float) -> Mod
 
 @template("carabiner")
 def carabiner(*, length_m: float, width: float, thick: float, taper: float) -> Model:
-    """Build a carabiner lying flat, its gate towards -Y; ``taper`` is the width of its small end over the large one's."""
+    """Build a lying carabiner with its gate towards -Y; ``taper`` is the small end's width relative to the large end's."""
     t = 0.5 * thick * length_m
     x, y = 0.5 * length_m - t, 0.5 * width * length_m - t
     bend = [(x - y, y), (x - 0.2 * y, 0.85 * y), (x, 0.1 * y), (x - 0.25 * y, -0.8 * y), (x - 0.8 * y, -y)]
@@ -188,7 +188,7 @@ def carabiner(*, length_m: float, width: float, thick: float, taper: float) -> M
 
 @template("chalk")
 def chalk(*, length_m: float, width_m: float, taper: float) -> Model:
-    """Build a stick of chalk lying, its worn end towards +X; ``taper`` is its width there over its own."""
+    """Build a lying stick of chalk, worn at the end towards +X; ``taper`` is the relative width there."""
     r, end = 0.5 * width_m, 0.5 * length_m
     body = rounded([(0, -end), (r, -end), (r, 0.1 * length_m), (taper * r, end), (0, end)], 0.0012)
     model = Model().add("body", lying(lathe(body, sides=chords(32))))
@@ -200,10 +200,10 @@ def chalk(*, length_m: float, width_m: float, taper: float) -> Model:
 
 @template("spinning top")
 def spinning_top(*, width_m: float, tall: float, peg: float, stem: float) -> Model:
-    """Build a spinning top lying on its rim and its peg, which is towards +X; ``peg`` and ``stem`` are shares of its height."""
+    """Build a spinning top lying on its rim and its peg, which points to +X; ``peg`` and ``stem`` are shares of its height."""
     r, h = 0.5 * width_m, tall * width_m
     foot, top = peg * h, (1 - stem) * h
-    tilt = float(np.arctan2(r, 0.62 * top))  # the line from its tip to its rim is level
+    tilt = float(np.arctan2(r, 0.62 * top))  # makes the line from tip to rim horizontal
 
     def laid(solid: Manifold) -> Manifold:
         return solid.rotate((0, -90 - float(np.degrees(tilt)) + 180, 0)).mirror((1, 0, 0))
@@ -217,7 +217,7 @@ def spinning_top(*, width_m: float, tall: float, peg: float, stem: float) -> Mod
         "stem", laid(lathe(rounded([(0, top - 0.001), (0.1 * r, top - 0.001), (0.13 * r, h), (0, h)], 0.03 * r))), "peg"
     )
     up, across = float(np.sin(tilt)), float(np.cos(tilt))
-    axis = np.array([-across, 0.0, up])  # from its tip up
+    axis = np.array([-across, 0.0, up])  # from the tip upward
     at = 0.68 * top
     model.region("rim", "body", lambda c: np.linalg.norm(c - (c @ axis)[:, None] * axis, axis=1) > 0.92 * r, "rim")
     model.point("end", "tip", "end", (0.0, 0.0, 0.0), (across, 0.0, -up))
@@ -229,7 +229,7 @@ def spinning_top(*, width_m: float, tall: float, peg: float, stem: float) -> Mod
 
 @template("bauble")
 def bauble(*, width_m: float, cap: float, loop: float) -> Model:
-    """Build a bauble with its cap and loop up; ``cap`` and ``loop`` are widths over its own."""
+    """Build a bauble with its cap and loop on top; ``cap`` and ``loop`` are widths relative to its own."""
     r = 0.5 * width_m
     model = Model().add("body", ellipsoid(width_m, width_m, width_m, sides=chords(64)))
     z = float(np.sqrt(1 - cap**2)) * r
@@ -245,7 +245,7 @@ def bauble(*, width_m: float, cap: float, loop: float) -> Model:
 
 @template("cardboard tube")
 def cardboard_tube(*, length_m: float, width_m: float, wall_m: float) -> Model:
-    """Build a tube of cardboard lying."""
+    """Build a lying cardboard tube."""
     r = 0.5 * width_m
     body = lying(cylinder(r, length_m, sides=chords(48))).translate((-0.5 * length_m, 0, 0))
     hole = lying(cylinder(r - wall_m, 2 * length_m, sides=chords(48))).translate((-length_m, 0, 0))

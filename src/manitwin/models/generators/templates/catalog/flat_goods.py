@@ -1,4 +1,4 @@
-"""Flat things that lie on a table: cards, chips, coasters, discs, instruments for drawing angles."""
+"""Flat objects that lie on a table: cards, chips, coasters, discs, and drawing instruments."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from manitwin.geometry.solids.shapes import (
 from manitwin.models.generators.templates.template import Model, template
 
 PRINT_M = 0.00025
-"""How high print stands out, so that it is a part of its own."""
+"""Height of print above its surface, metres, so that it is a separate part."""
 
 
 def _faced(
     model: Model, part: str, half_depth_m: float, height_m: float, off_m: tuple[float, float] = (0.0, 0.0)
 ) -> Model:
-    """Note both faces of a flat thing, beside the middle, and its edge towards -Y."""
+    """Add points on both faces of a flat object, beside the centre, and on its edge towards -Y."""
     model.point("front", "face", part, (*off_m, height_m), (0.0, 0.0, 1.0))
     model.point("edge", "surface", part, (off_m[0], -half_depth_m, 0.5 * height_m), (0.0, -1.0, 0.0))
     return model.point("back", "face", part, (*off_m, 0.0), (0.0, 0.0, -1.0))
@@ -34,7 +34,7 @@ def _faced(
 
 @template("credit card")
 def credit_card(*, length_m: float, width: float, thick_m: float, chip: float) -> Model:
-    """Build a bank card lying, a chip, a stripe of another colour and rows of numbers on it; ``chip`` is over the width."""
+    """Build a lying bank card with a chip, a coloured stripe and rows of digits; ``chip`` is relative to the width."""
     w = width * length_m
     model = Model().add("body", prism(rectangle(length_m, w, radius_m=0.0032), thick_m))
     top = thick_m - 0.0001
@@ -55,7 +55,7 @@ def credit_card(*, length_m: float, width: float, thick_m: float, chip: float) -
 
 @template("business card")
 def business_card(*, length_m: float, width: float, thick_m: float, lines: float) -> Model:
-    """Build a card lying with a mark and ``lines`` lines of text."""
+    """Build a lying card with a logo and ``lines`` lines of text."""
     w = width * length_m
     model = Model().add("body", box(length_m, w, thick_m))
     top = thick_m - 0.0001
@@ -73,7 +73,7 @@ def business_card(*, length_m: float, width: float, thick_m: float, lines: float
 
 @template("poker chip")
 def poker_chip(*, width_m: float, thick_m: float, spots: float) -> Model:
-    """Build a chip lying with ``spots`` spots of another colour on its edge."""
+    """Build a lying chip with ``spots`` spots of another colour on its edge."""
     r, count = 0.5 * width_m, round(spots)
     edge = rounded([(0, 0), (r, 0), (r, thick_m), (0, thick_m)], 0.0004)
     model = Model().add("body", lathe(edge, sides=chords(96)))
@@ -94,7 +94,7 @@ def poker_chip(*, width_m: float, thick_m: float, spots: float) -> Model:
 
 @template("coaster")
 def coaster(*, width_m: float, thick_m: float, rim: float) -> Model:
-    """Build a round coaster lying, its middle lower than its rim; ``rim`` is that one's width over the coaster's."""
+    """Build a lying round coaster with a raised rim; ``rim`` is the rim's width relative to the coaster's."""
     r = 0.5 * width_m
     body = lathe(rounded([(0, 0), (r, 0), (r, thick_m), (0, thick_m)], 0.18 * thick_m), sides=chords(72))
     model = Model().add("body", body)
@@ -108,7 +108,7 @@ def coaster(*, width_m: float, thick_m: float, rim: float) -> Model:
 
 @template("trivet")
 def trivet(*, width_m: float, thick_m: float, slots: float, foot: float) -> Model:
-    """Build a square trivet of slats that stands on low feet; ``slots`` are cut across it, ``foot`` is over its thickness."""
+    """Build a square trivet of slats on low feet; ``slots`` is the number of slots, ``foot`` is relative to the thickness."""
     w, count, high = width_m, round(slots), foot * thick_m
     model = Model().add(
         "body", prism(rectangle(w, w, radius_m=0.1 * w), thick_m, radius_m=0.12 * thick_m).translate((0, 0, high))
@@ -128,7 +128,7 @@ def trivet(*, width_m: float, thick_m: float, slots: float, foot: float) -> Mode
 
 @template("compact disc")
 def compact_disc(*, width_m: float, hole: float, label: float) -> Model:
-    """Build a disc lying with its printed side up; ``hole`` and ``label`` are widths over its own."""
+    """Build a lying disc with its printed side up; ``hole`` and ``label`` are widths relative to its own."""
     r, h = 0.5 * width_m, 0.0012
     model = Model().add("body", cylinder(r, h, sides=chords(96)))
     ring = cylinder(label * r, 0.0002, sides=chords(72)) - cylinder(1.5 * hole * r, 0.001)
@@ -140,14 +140,14 @@ def compact_disc(*, width_m: float, hole: float, label: float) -> Model:
 
 
 def _marks(at: list[tuple[float, float, float]], long_m: float, height_m: float) -> Manifold:
-    """Return thin marks at places (x, y) that point along an angle in degrees."""
+    """Return thin marks at (x, y, angle), where the angle in degrees is their direction."""
     mark = box(long_m, 0.0004, PRINT_M)
     return union([mark.rotate((0, 0, turn)).translate((x, y, height_m - 0.00005)) for x, y, turn in at])
 
 
 @template("set square")
 def set_square(*, length_m: float, angle: float, thick_m: float, frame: float) -> Model:
-    """Build a set square lying, open in its middle; ``angle`` is that at its long leg's end, rad, ``frame`` its width."""
+    """Build a lying set square, open in its middle; ``angle`` (rad) is that at the end of its long leg, ``frame`` its width."""
     x, y = length_m * float(np.cos(angle)), length_m * float(np.sin(angle))
     outer = np.array([(0.0, 0.0), (x, 0.0), (0.0, y)])
     middle, inset = np.array([(x + y - length_m) / 2] * 2), frame * length_m  # of the incircle
@@ -163,7 +163,7 @@ def set_square(*, length_m: float, angle: float, thick_m: float, frame: float) -
 
 @template("protractor")
 def protractor(*, width_m: float, thick_m: float, band: float) -> Model:
-    """Build a half-round protractor lying, open in its middle; ``band`` is the scale's width over the radius."""
+    """Build a lying half-round protractor, open in its middle; ``band`` is the scale's width relative to the radius."""
     r, base = 0.5 * width_m, 0.16 * width_m
     turn = np.linspace(0.0, np.pi, 49)
     half = [(r * float(np.cos(a)), base + (r - 0.5 * base) * float(np.sin(a))) for a in turn]

@@ -1,4 +1,4 @@
-"""Fruit and vegetables: what stands has its stem up, what lies has it towards +X."""
+"""Fruit and vegetables: standing ones have their stem up, lying ones have it towards +X."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("apple")
 def apple(*, width_m: float, tall: float, shoulder: float, stem_m: float) -> Model:
-    """Build an apple; ``shoulder`` is how wide it is near its top and how narrow near its base."""
+    """Build an apple; ``shoulder`` sets how wide it is near its top and how narrow near its base."""
     r, h = 0.5 * width_m, tall * width_m
     low, high = 0.9 - 0.5 * (shoulder - 1), 0.95 + 0.3 * (shoulder - 1)
     profile = [(0, 0.08), (0.16, 0.045), (0.34, 0.0), (0.66 * low / 0.9, 0.08), (low, 0.3), (1, 0.58)]
@@ -28,7 +28,7 @@ def apple(*, width_m: float, tall: float, shoulder: float, stem_m: float) -> Mod
 
 
 def citrus(width_m: float, tall: float, mark: float) -> Model:
-    """Build a round citrus fruit with the mark of its stem up, which is ``mark`` of its width."""
+    """Build a round citrus fruit with the mark of its stem on top; ``mark`` is its relative width."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.02), (0.3, 0.015), (0.62, 0.11), (0.9, 0.3), (1, 0.5), (0.9, 0.7), (0.62, 0.89), (0.3, 0.985)]
     model = Model().add("body", turned([*profile, (0.1, 0.985), (0, 0.975)], width_m, h))
@@ -40,13 +40,13 @@ def citrus(width_m: float, tall: float, mark: float) -> Model:
 
 @template("orange")
 def orange(*, width_m: float, tall: float, mark: float) -> Model:
-    """Build an orange with the mark of its stem up."""
+    """Build an orange with the mark of its stem on top."""
     return citrus(width_m, tall, mark)
 
 
 @template("lemon")
 def lemon(*, length_m: float, width: float, nipple: float) -> Model:
-    """Build a lemon lying, its nipple towards +X; ``nipple`` is its share of the length."""
+    """Build a lying lemon with its nipple towards +X; ``nipple`` is its share of the length."""
     wide, waist = width * length_m, 1 - nipple
     profile = [
         (0, 0),
@@ -68,7 +68,7 @@ def lemon(*, length_m: float, width: float, nipple: float) -> Model:
 
 @template("peach")
 def peach(*, width_m: float, tall: float, cleft: float) -> Model:
-    """Build a peach, its stem's dimple up, a cleft down its front."""
+    """Build a peach with the stem cavity on top and a cleft in front."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.0), (0.25, 0.012), (0.6, 0.1), (0.9, 0.3), (1, 0.55), (0.9, 0.79), (0.66, 0.95), (0.42, 1.0)]
     body = turned([*profile, (0.18, 0.95), (0.05, 0.89), (0, 0.88)], width_m, h, sides=96)
@@ -87,7 +87,7 @@ def peach(*, width_m: float, tall: float, cleft: float) -> Model:
 
 @template("pear")
 def pear(*, height_m: float, width: float, neck: float, stem_m: float) -> Model:
-    """Build a pear that stands on its blossom end; ``neck`` is how thick its neck is over its belly."""
+    """Build a pear that stands on its blossom end; ``neck`` is the neck's thickness relative to the belly's."""
     wide, h = width * height_m, height_m
     profile = [(0, 0.05), (0.15, 0.02), (0.3, 0.0), (0.7, 0.06), (0.96, 0.22), (1, 0.34), (0.88, 0.5)]
     profile += [
@@ -106,7 +106,7 @@ def pear(*, height_m: float, width: float, neck: float, stem_m: float) -> Model:
 
 @template("tomato")
 def tomato(*, width_m: float, tall: float, ribs: float, leaf: float) -> Model:
-    """Build a tomato with its green star up; ``ribs`` is how deep it is ribbed."""
+    """Build a tomato with its sepals on top; ``ribs`` is the depth of its ribs."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.0), (0.35, 0.01), (0.72, 0.13), (0.95, 0.35), (1, 0.52), (0.93, 0.75), (0.7, 0.94), (0.42, 1.0)]
     body = turned([*profile, (0.18, 0.955), (0, 0.9)], width_m, h, sides=80)
@@ -121,7 +121,7 @@ def tomato(*, width_m: float, tall: float, ribs: float, leaf: float) -> Model:
 
 @template("pumpkin")
 def pumpkin(*, width_m: float, tall: float, ribs: float, stem: float) -> Model:
-    """Build a pumpkin with ten ribs; ``stem`` is the stem's height over the width."""
+    """Build a pumpkin with ten ribs; ``stem`` is the stem's height relative to the width."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.09), (0.18, 0.05), (0.42, 0.0), (0.76, 0.1), (0.96, 0.32), (1, 0.5), (0.95, 0.7), (0.74, 0.91)]
     body = turned([*profile, (0.46, 1.0), (0.22, 0.95), (0, 0.89)], width_m, h, sides=120)
@@ -140,7 +140,7 @@ def pumpkin(*, width_m: float, tall: float, ribs: float, stem: float) -> Model:
 
 @template("onion")
 def onion(*, width_m: float, tall: float, neck: float) -> Model:
-    """Build an onion that stands on its roots; ``neck`` is the height of its dry neck over the width."""
+    """Build an onion that stands on its roots; ``neck`` is the height of its dry neck relative to the width."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.0), (0.22, 0.0), (0.6, 0.1), (0.92, 0.33), (1, 0.5), (0.9, 0.7), (0.62, 0.87), (0.3, 0.97)]
     model = Model().add("body", turned([*profile, (0.14, 1.02), (0, 1.04)], width_m, h))
@@ -157,7 +157,7 @@ def onion(*, width_m: float, tall: float, neck: float) -> Model:
 
 @template("banana")
 def banana(*, length_m: float, width: float, bend: float, stem: float) -> Model:
-    """Build a banana lying on its side, its stem towards +X; ``bend`` is the angle in rad from end to end."""
+    """Build a banana lying on its side with its stem towards +X; ``bend`` is the angle in rad from end to end."""
     r, angle = 0.5 * width * length_m, bend * np.linspace(-0.5, 0.5, 40)
     about = length_m / (2 * np.sin(0.5 * bend))
     curve = np.column_stack([about * np.sin(angle), about * (np.cos(angle) - np.cos(0.25 * bend)), 0 * angle])
@@ -182,7 +182,7 @@ _BANANA = [0.2, 0.32, 0.62, 0.88, 1.0, 1.0, 0.85, 0.52, 0.3, 0.27]
 
 @template("carrot")
 def carrot(*, length_m: float, width: float, taper: float, tops_m: float) -> Model:
-    """Build a carrot lying, its green stalks towards +X, cut off at ``tops_m``; ``taper`` is its width near the tip."""
+    """Build a lying carrot with green stalks towards +X, cut at ``tops_m``; ``taper`` is its relative width near the tip."""
     r, crown = 0.5 * width * length_m, 0.5 * length_m
     along = np.linspace(0, 1, 48)
     half = r * np.interp(along, [0, 0.02, 0.1, 0.5, 0.9, 0.97, 1], [0.06, 0.14, taper, 0.5 * (1 + taper), 1, 0.92, 0.5])
@@ -205,7 +205,10 @@ def carrot(*, length_m: float, width: float, taper: float, tops_m: float) -> Mod
 
 @template("eggplant")
 def eggplant(*, length_m: float, width: float, neck: float, bend: float, stem_m: float) -> Model:
-    """Build an eggplant lying, its stem towards +X; ``neck`` is how thick it is at its green cap, ``bend`` how far it bends."""
+    """Build a lying eggplant with its stem towards +X; ``neck`` is its relative thickness at the green cap.
+
+    ``bend`` is half the curvature of its centre line times its length.
+    """
     r = 0.5 * width * length_m
     share = [0, 0.02, 0.07, 0.16, 0.3, 0.5, 0.75, 0.93, 1]
     wide = [0.15, 0.4, 0.68, 0.9, 1, 0.88, 0.5 * (neck + 0.75), neck, 0.75 * neck]
@@ -230,7 +233,7 @@ def eggplant(*, length_m: float, width: float, neck: float, bend: float, stem_m:
 
 @template("strawberry")
 def strawberry(*, length_m: float, width: float, taper: float, leaf: float) -> Model:
-    """Build a strawberry lying on its side, its tip towards +X; ``taper`` is how wide it is below its middle."""
+    """Build a strawberry lying on its side with its tip towards +X; ``taper`` is its relative width below its middle."""
     wide = width * length_m
     profile = [(0, 0.02), (0.45, 0.0), (0.82, 0.07), (1, 0.24), (0.94, 0.45), (taper, 0.7), (0.36, 0.92), (0.16, 0.985)]
     body = turned([*profile, (0, 1.0)], wide, length_m)
@@ -243,7 +246,7 @@ def strawberry(*, length_m: float, width: float, taper: float, leaf: float) -> M
         r = 0.5 * wide * float(np.interp(z, edge[:, 1], edge[:, 0]))
         seed = ellipsoid(0.0007, 0.0011, 0.0018, sides=8)
         seeds.append(seed.translate((r, 0, z * length_m)).rotate((0, 0, float(np.degrees(a)))))
-    # on a side of the cone from its widest ring to where it narrows: the tangent lies level
+    # The side of the cone from its widest ring to where it narrows rests on the ground: its tangent is horizontal.
     tilt = float(np.degrees(np.arctan2(0.5 * wide * (1 - taper), 0.46 * length_m)))
 
     def laid(solid: Manifold) -> Manifold:

@@ -1,4 +1,4 @@
-"""Still more fruit: round ones stand with their stem up, long ones lie with it towards +X."""
+"""Further fruit: round ones stand with their stem up, long ones lie with it towards +X."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("lime")
 def lime(*, length_m: float, width: float, nipple: float) -> Model:
-    """Build a lime lying, its nipple towards +X; ``nipple`` is its share of the length."""
+    """Build a lying lime with its nipple towards +X; ``nipple`` is its share of the length."""
     wide, waist = width * length_m, 1 - nipple
     profile = [(0, 0.0), (0.16, 0.005), (0.34, 0.035), (0.66, 0.14), (0.93, 0.31), (1, 0.48), (0.93, 0.68)]
     profile += [(0.64, waist - 0.04), (0.3, 1 - 0.5 * nipple), (0.14, 1 - 0.06 * nipple), (0, 1)]
@@ -26,13 +26,13 @@ def lime(*, length_m: float, width: float, nipple: float) -> Model:
 
 @template("grapefruit")
 def grapefruit(*, width_m: float, tall: float, mark: float) -> Model:
-    """Build a grapefruit with the mark of its stem up."""
+    """Build a grapefruit with the mark of its stem on top."""
     return citrus(width_m, tall, mark)
 
 
 @template("kiwi")
 def kiwi(*, length_m: float, width: float, flat: float) -> Model:
-    """Build a kiwi lying, the end of its stem towards +X; ``flat`` is its height over its width."""
+    """Build a lying kiwi with its stem end towards +X; ``flat`` is its height relative to its width."""
     wide = width * length_m
     profile = [(0, 0.0), (0.3, 0.012), (0.66, 0.1), (0.92, 0.28), (1, 0.5), (0.93, 0.72), (0.7, 0.9), (0.38, 0.985)]
     body = lying(turned([*profile, (0.12, 1.0), (0, 1.0)], wide, length_m).translate((0, 0, -0.5 * length_m)))
@@ -47,7 +47,10 @@ def kiwi(*, length_m: float, width: float, flat: float) -> Model:
 
 @template("mango")
 def mango(*, length_m: float, width: float, flat: float, beak: float) -> Model:
-    """Build a mango lying on its flat side, its stem towards +X; ``beak`` is how far its tip is bent, of the width."""
+    """Build a mango lying on its flat side with its stem towards +X.
+
+    ``beak`` is the displacement of its bent tip relative to the width.
+    """
     wide = width * length_m
     profile = [(0, 0.0), (0.3, 0.02), (0.62, 0.12), (0.88, 0.3), (1, 0.55), (0.95, 0.76), (0.72, 0.92), (0.38, 0.985)]
     body = lying(
@@ -68,7 +71,7 @@ def mango(*, length_m: float, width: float, flat: float, beak: float) -> Model:
 
 @template("apricot")
 def apricot(*, width_m: float, tall: float, cleft: float) -> Model:
-    """Build an apricot, its stem's dimple up, a cleft down its front."""
+    """Build an apricot with the stem cavity on top and a cleft in front."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.0), (0.3, 0.014), (0.66, 0.12), (0.92, 0.32), (1, 0.52), (0.92, 0.76), (0.7, 0.93), (0.42, 0.995)]
     body = turned([*profile, (0.2, 0.97), (0.06, 0.92), (0, 0.91)], width_m, h, sides=80)
@@ -80,7 +83,7 @@ def apricot(*, width_m: float, tall: float, cleft: float) -> Model:
 
 @template("pomegranate")
 def pomegranate(*, width_m: float, tall: float, ribs: float, crown: float) -> Model:
-    """Build a pomegranate with its crown up; ``ribs`` is how deep its faces are, ``crown`` its height over the width."""
+    """Build a pomegranate with its crown on top; ``ribs`` is the depth of its faces, ``crown`` its height over the width."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.02), (0.25, 0.0), (0.64, 0.08), (0.93, 0.3), (1, 0.52), (0.93, 0.74), (0.68, 0.9), (0.36, 0.98)]
     body = ribbed(turned([*profile, (0.2, 1.02), (0, 1.02)], width_m, h, sides=72), lambda a: 1 + ribs * np.cos(6 * a))
@@ -99,7 +102,7 @@ def pomegranate(*, width_m: float, tall: float, ribs: float, crown: float) -> Mo
 
 @template("fig")
 def fig(*, height_m: float, width: float, ribs: float) -> Model:
-    """Build a fig that stands on its broad end, its neck up; ``ribs`` is how deep it is ribbed."""
+    """Build a fig that stands on its broad end with its neck up; ``ribs`` is the depth of its ribs."""
     wide, h = width * height_m, height_m
     profile = [(0, 0.03), (0.12, 0.0), (0.42, 0.0), (0.78, 0.08), (0.98, 0.26), (1, 0.38), (0.86, 0.55), (0.52, 0.72)]
     body = turned([*profile, (0.26, 0.86), (0.17, 0.95), (0, 0.95)], wide, h, sides=96)
@@ -113,7 +116,7 @@ def fig(*, height_m: float, width: float, ribs: float) -> Model:
 
 @template("cherry")
 def cherry(*, width_m: float, tall: float, stem: float) -> Model:
-    """Build a cherry with its stalk, which is ``stem`` of its width long."""
+    """Build a cherry with its stalk; ``stem`` is the stalk's length relative to the cherry's width."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.02), (0.2, 0.0), (0.62, 0.1), (0.92, 0.34), (1, 0.58), (0.9, 0.82), (0.62, 0.97), (0.38, 1.0)]
     model = Model().add("body", turned([*profile, (0.15, 0.95), (0, 0.92)], width_m, h))
@@ -130,7 +133,7 @@ def cherry(*, width_m: float, tall: float, stem: float) -> Model:
 
 @template("papaya")
 def papaya(*, length_m: float, width: float, neck: float) -> Model:
-    """Build a papaya lying, its stem towards +X; ``neck`` is how thick it is near that, over its belly."""
+    """Build a lying papaya with its stem towards +X; ``neck`` is the thickness near the stem relative to the belly's."""
     wide = width * length_m
     profile = [(0, 0.0), (0.14, 0.01), (0.5, 0.07), (0.88, 0.22), (1, 0.38), (0.93, 0.58), (0.5 * (neck + 0.92), 0.74)]
     body = turned([*profile, (neck, 0.88), (0.62 * neck, 0.965), (0, 0.985)], wide, length_m, sides=80)

@@ -1,4 +1,4 @@
-"""Food of a shop's shelf: eggs, baked things, cheese, chocolate; potatoes and mushrooms."""
+"""Groceries: eggs, baked goods, cheese, chocolate, potatoes and mushrooms."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("egg")
 def egg(*, length_m: float, width: float, blunt: float) -> Model:
-    """Build an egg lying, its pointed end towards +X; ``blunt`` is how much wider its other half is."""
+    """Build a lying egg with its pointed end towards +X; ``blunt`` is how much wider the other half is."""
     angle = np.linspace(0, np.pi, 32)
     wide = 0.5 * width * length_m * np.sin(angle) * (1 + 0.5 * blunt * np.cos(angle)) / (1 + 0.06 * blunt**2)
     solid = lathe(np.column_stack([wide, -0.5 * length_m * np.cos(angle)]), sides=chords(48))
@@ -39,7 +39,7 @@ def egg(*, length_m: float, width: float, blunt: float) -> Model:
 
 @template("potato")
 def potato(*, length_m: float, width: float, thick: float, lumps: float) -> Model:
-    """Build a potato lying, with eyes; ``lumps`` is how far it is from an ellipsoid."""
+    """Build a lying potato with eyes; ``lumps`` is the deviation from an ellipsoid."""
     x, y, z = length_m, width * length_m, thick * length_m
 
     def lumped(vertices: np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ def potato(*, length_m: float, width: float, thick: float, lumps: float) -> Mode
 
 @template("mushroom")
 def mushroom(*, width_m: float, tall: float, dome: float, stem: float) -> Model:
-    """Build a mushroom that stands on its cut stem; ``dome`` is the height of the cap over the whole one."""
+    """Build a mushroom that stands on its cut stem; ``dome`` is the cap's share of the height."""
     r, h = 0.5 * width_m, tall * width_m
     low, thick = (1 - dome) * h, 0.5 * stem * width_m
     cap = [(0, low + 0.1 * h), (0.75 * r, low + 0.06 * h), (0.9 * r, low), (r, low + 0.1 * dome * h)]
@@ -102,7 +102,7 @@ def mushroom(*, width_m: float, tall: float, dome: float, stem: float) -> Model:
 
 @template("donut")
 def donut(*, width_m: float, thick: float, hole: float, glaze: float) -> Model:
-    """Build a donut lying flat with glaze and sprinkles; ``glaze`` is how far down its side that reaches."""
+    """Build a lying donut with glaze and sprinkles; ``glaze`` is how far the glaze reaches down its side."""
     r, h = 0.5 * width_m, thick * width_m
     ring, half = ring_radii(width_m, hole)
     flat = h / (2 * half)
@@ -126,7 +126,7 @@ def donut(*, width_m: float, thick: float, hole: float, glaze: float) -> Model:
 
 @template("cookie")
 def cookie(*, width_m: float, thick: float, chips: float) -> Model:
-    """Build a round cookie lying flat with chips of chocolate; ``chips`` is their width over the cookie's."""
+    """Build a lying round cookie with chocolate chips; ``chips`` is their width relative to the cookie's."""
     r, h = 0.5 * width_m, thick * width_m
     profile = [(0, 0), (0.93 * r, 0), (r, 0.35 * h), (0.92 * r, 0.7 * h), (0.6 * r, 0.94 * h), (0, h)]
     body = ribbed(
@@ -145,7 +145,7 @@ def cookie(*, width_m: float, thick: float, chips: float) -> Model:
 
 @template("bread")
 def bread(*, length_m: float, width: float, height: float, dome: float) -> Model:
-    """Build a loaf of a tin lying along X with cuts across its crust; ``dome`` is how far that bulges over the sides."""
+    """Build a tin loaf lying along X with cuts across its crust; ``dome`` is how far the crust bulges over the sides."""
     y, h = 0.5 * width * length_m, height * length_m
     side, out = (1 - 0.5 * dome) * h, (1 + 0.1 * dome) * y
     model = Model().add("body", box(0.96 * length_m, 2 * y, side, radius_m=0.012))
@@ -171,7 +171,7 @@ def bread(*, length_m: float, width: float, height: float, dome: float) -> Model
 
 @template("chocolate bar")
 def chocolate_bar(*, length_m: float, width: float, thick_m: float, wrapped: float) -> Model:
-    """Build a bar of squares lying flat, the share ``wrapped`` of it towards -X in its paper."""
+    """Build a lying bar of squares with the share ``wrapped`` towards -X in its paper."""
     y = width * length_m
     model = Model().add("body", box(length_m, y, 0.6 * thick_m, radius_m=0.001))
     columns, rows = max(4, round(length_m / 0.026)), max(2, round(y / 0.021))
@@ -193,7 +193,10 @@ def chocolate_bar(*, length_m: float, width: float, thick_m: float, wrapped: flo
 
 @template("cheese")
 def cheese(*, length_m: float, angle: float, height: float, holes: float) -> Model:
-    """Build a wedge of a round cheese lying flat, its tip towards +X; ``angle`` in rad; ``holes`` is their width over its."""
+    """Build a lying wedge of a round cheese with its tip towards +X.
+
+    ``angle`` is in rad; ``holes`` is the width of its holes relative to its own.
+    """
     h, half = height * length_m, 0.5 * angle
     around = np.pi + np.linspace(-half, half, 24)
     rim = [(length_m * np.cos(a), length_m * np.sin(a)) for a in around]

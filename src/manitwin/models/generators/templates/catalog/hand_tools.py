@@ -1,4 +1,4 @@
-"""Hand tools: a handle and a working end, lying as they are put down, the working end towards +X."""
+"""Hand tools with a handle, lying with the working end towards +X."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 
 def grip(start_m: float, end_m: float, radius_m: float, *, flatten: float = 0.8, swell: float = 0.12) -> Manifold:
-    """Return a handle along X, thicker by ``swell`` in its middle and rounded at its ends, its axis on z = 0."""
+    """Return a handle along X, thickened by ``swell`` in its middle and rounded at its ends, with its axis on z = 0."""
     along = np.linspace(0.0, 1.0, 24)
     ends = np.minimum(1.0, np.sqrt(np.clip(np.minimum(along, 1 - along) / 0.05, 0.05, 1.0)))
     path = np.stack([start_m + along * (end_m - start_m), 0 * along, 0 * along], axis=1)
@@ -19,13 +19,13 @@ def grip(start_m: float, end_m: float, radius_m: float, *, flatten: float = 0.8,
 
 
 def upright(outline: list[tuple[float, float]], width_m: float) -> Manifold:
-    """Return an outline in x and z raised along Y about y = 0."""
+    """Return an outline in x and z extruded along Y, centred on y = 0."""
     return prism(polygon(outline), width_m).rotate((90, 0, 0)).translate((0, 0.5 * width_m, 0))
 
 
 @template("hammer")
 def hammer(*, length_m: float, head: float, face_m: float) -> Model:
-    """Build a claw hammer: the face towards -Y, the claw towards +Y; ``head`` is the head's length over the tool's."""
+    """Build a claw hammer with its face to -Y and its claw to +Y; ``head`` is the head's length relative to the tool's."""
     across, at = head * length_m, 0.46 * length_m
     eye = box(1.05 * face_m, 0.34 * across, face_m, radius_m=0.003).translate((at, 0, -0.5 * face_m))
     neck = cylinder(0.36 * face_m, 0.25 * across).rotate((90, 0, 0)).translate((at, -0.1 * across, 0))
@@ -112,7 +112,7 @@ def allen_key(*, length_m: float, arm: float, thick: float) -> Model:
 
 @template("pliers")
 def pliers(*, length_m: float, spread: float, thick_m: float) -> Model:
-    """Build closed pliers: jaws towards +X, two grips towards -X that are ``spread`` of the length apart."""
+    """Build closed pliers with jaws towards +X and two grips towards -X that are ``spread`` of the length apart."""
     joint, half = 0.2 * length_m, 0.5 * spread * length_m
     model = Model().add("joint", cylinder(0.075 * length_m, thick_m).translate((joint, 0, -0.5 * thick_m)), "head")
     jaws = polygon(
@@ -240,7 +240,7 @@ def paint_brush(*, length_m: float, width_m: float, bristles: float) -> Model:
 
 @template("flashlight")
 def flashlight(*, length_m: float, head: float, width_m: float) -> Model:
-    """Build a torch lying along X, its light towards +X and its switch up."""
+    """Build a flashlight lying along X, with its light towards +X and its switch up."""
     r, start = 0.5 * width_m, (0.5 - head) * length_m
     profile = rounded(
         [(0.66 * r, -0.5 * length_m), (0.68 * r, start - 0.02), (r, start + 0.012), (r, 0.5 * length_m)], 0.004
@@ -254,7 +254,7 @@ def flashlight(*, length_m: float, head: float, width_m: float) -> Model:
 
 @template("axe")
 def axe(*, length_m: float, head: float, thick_m: float) -> Model:
-    """Build a hatchet lying on its side, the edge towards -Y."""
+    """Build a hatchet lying on its side, with its edge towards -Y."""
     across, at = head * length_m, 0.42 * length_m
     outline = [(-0.14, 0.25), (0.14, 0.25), (0.13, -0.2), (0.32, -0.75), (0.0, -0.78), (-0.36, -0.72), (-0.14, -0.2)]
     flat = prism(polygon([(at + across * x, across * y) for x, y in outline]), thick_m).translate(

@@ -1,4 +1,4 @@
-"""Small solid things: hardware, rings, coins, dice, weights."""
+"""Small solid objects: hardware, rings, coins, dice, weights."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("roll of tape")
 def roll_of_tape(*, width_m: float, height: float, core: float) -> Model:
-    """Build a roll of tape lying on its side: ``height`` and ``core`` over its width."""
+    """Build a roll of tape lying on its side; ``height`` and ``core`` are relative to its width."""
     high = height * width_m
     model = (
         Model()
@@ -67,7 +67,7 @@ def brick(*, length_m: float, width: float, height: float) -> Model:
 
 @template("nut")
 def nut(*, width_m: float, height: float, hole: float) -> Model:
-    """Build a hexagonal nut lying flat; ``width_m`` is over its corners."""
+    """Build a lying hexagonal nut; ``width_m`` is measured across its corners."""
     high = height * width_m
     body = cylinder(0.5 * width_m, high, sides=6) ^ lathe(
         [
@@ -102,7 +102,7 @@ def gear(*, width_m: float, height: float, teeth: float) -> Model:
 
 @template("dice")
 def dice(*, length_m: float, edge: float) -> Model:
-    """Build a die: one on top, two towards -Y, three towards +X; opposite sides sum to seven."""
+    """Build a die with one on top, two towards -Y and three towards +X; opposite sides sum to seven."""
     a = length_m
     model = Model().add("body", box(a, a, a, radius_m=edge * a))
     spots = {1: [(0, 0)], 2: [(-1, -1), (1, 1)], 3: [(-1, -1), (0, 0), (1, 1)], 4: [(-1, -1), (-1, 1), (1, -1), (1, 1)]}
@@ -209,7 +209,10 @@ def coin(*, width_m: float, thick: float) -> Model:
 
 @template("bolt")
 def bolt(*, length_m: float, width: float, head: float, shank: float) -> Model:
-    """Build a hexagonal bolt that lies, its head towards -X; ``width`` over the length, ``head`` and ``shank`` over its width."""
+    """Build a lying hexagonal bolt with its head towards -X.
+
+    ``width`` is relative to the length, ``head`` and ``shank`` to the width.
+    """
     wide = width * length_m
     high, thin = head * wide, 0.5 * shank * wide
     hexagon = (
@@ -226,7 +229,7 @@ def bolt(*, length_m: float, width: float, head: float, shank: float) -> Model:
 
 @template("washer")
 def washer(*, width_m: float, hole: float, thick: float) -> Model:
-    """Build a flat ring that lies; ``hole`` and ``thick`` over its width."""
+    """Build a lying flat ring; ``hole`` and ``thick`` are relative to its width."""
     high = thick * width_m
     edge = 0.2 * high
     model = Model().add(

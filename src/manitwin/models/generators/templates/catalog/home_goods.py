@@ -1,4 +1,4 @@
-"""Goods of a hall and a wall. Long ones lie along X, the end that does the work towards +X."""
+"""Household fittings and utensils. Long ones lie along X with the working end towards +X."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("light switch")
 def light_switch(*, width_m: float, tall: float, deep: float, rocker: float) -> Model:
-    """Build a switch's plate that lies on its back, a rocker in it that is pressed; ``rocker`` is its share of the plate."""
+    """Build a switch plate lying on its back, with a rocker to press; ``rocker`` is its share of the plate."""
     x, y, t = tall * width_m, width_m, deep * width_m
     model = Model().add("body", prism(rectangle(x, y, radius_m=0.08 * y), t, radius_m=0.3 * t))
     a, b = rocker * x, rocker * y
@@ -26,7 +26,7 @@ def light_switch(*, width_m: float, tall: float, deep: float, rocker: float) -> 
 
 @template("wall socket")
 def wall_socket(*, width_m: float, deep: float, well: float) -> Model:
-    """Build a socket's plate that lies on its back, a round well with two holes in it; ``well`` is its width over the plate's."""
+    """Build a socket plate lying on its back, with a round recess and two holes; ``well`` is its width over the plate's."""
     y, t, r = width_m, deep * width_m, 0.5 * well * width_m
     model = Model().add("body", prism(rectangle(y, y, radius_m=0.08 * y), t, radius_m=0.25 * t))
     model.cut("well", cylinder(r, t, top_radius_m=1.06 * r).translate((0, 0, 0.35 * t)), "")
@@ -38,7 +38,7 @@ def wall_socket(*, width_m: float, deep: float, well: float) -> Model:
 
 @template("lint roller")
 def lint_roller(*, length_m: float, roll: float, width: float, grip: float) -> Model:
-    """Build a roller of sticky paper on a handle: ``roll`` is its share of the length, ``grip`` the handle's width over it."""
+    """Build a lint roller: ``roll`` is the roll's share of the length, ``grip`` the handle's width relative to the roll's."""
     n, r = length_m, 0.5 * width * length_m
     start, thin = (0.5 - roll) * n, grip * r
     model = Model().add("roller", lying(cylinder(r, roll * n).translate((0, 0, start))), "roller")
@@ -60,7 +60,7 @@ def lint_roller(*, length_m: float, roll: float, width: float, grip: float) -> M
 
 @template("hand broom")
 def hand_broom(*, length_m: float, head: float, width: float, bristles: float) -> Model:
-    """Build a dust brush that stands on its bristles: ``head`` is its share of the length, ``bristles`` their height over it."""
+    """Build a dust brush that stands on its bristles; ``head`` is its share of the length, ``bristles`` their relative height."""
     n, y, low = length_m, width * length_m, bristles * length_m
     start, thick = (0.5 - head) * n, 0.055 * n
     back = prism(rectangle(head * n, y, radius_m=0.3 * y), thick, radius_m=0.3 * thick).translate(
@@ -88,7 +88,7 @@ def hand_broom(*, length_m: float, head: float, width: float, bristles: float) -
 
 @template("shoe horn")
 def shoe_horn(*, length_m: float, width: float, grip: float, hollow: float) -> Model:
-    """Build a shoe horn that lies, its blade curved across towards +X; ``grip`` is the handle's width over the blade's."""
+    """Build a lying shoe horn whose blade towards +X is curved across; ``grip`` is the handle's width over the blade's."""
     n, y = length_m, width * length_m
     t, along = 0.0022, np.linspace(0.0, 1.0, 30)
     half = 0.5 * y * np.interp(along, [0, 0.04, 0.35, 0.75, 0.95, 1.0], [0.7 * grip, grip, grip, 0.96, 0.98, 0.72])

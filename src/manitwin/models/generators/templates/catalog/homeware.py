@@ -1,4 +1,4 @@
-"""Things that stand about a home: to save, to smoke, to wait, to wipe."""
+"""Objects that stand about a home: an ashtray, a piggy bank, an hourglass, kitchen paper, a soap dish."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def ashtray(*, width_m: float, height: float, wall: float, rests: float) -> Mode
 
 @template("piggy bank")
 def piggy_bank(*, length_m: float, width: float, height: float) -> Model:
-    """Build a pig on four legs, its snout towards -Y, a slot for coins in its back."""
+    """Build a pig on four legs with its snout towards -Y and a coin slot in its back."""
     wide, high = width * length_m, height * length_m
     leg, long = 0.2 * high, 0.86 * length_m
     middle = leg + 0.5 * (high - leg) - 0.02 * high
@@ -98,7 +98,7 @@ def piggy_bank(*, length_m: float, width: float, height: float) -> Model:
 
 @template("hourglass")
 def hourglass(*, height_m: float, width: float, neck_m: float, sand: float) -> Model:
-    """Build an hourglass between two discs on three posts, part of its sand run down."""
+    """Build an hourglass between two discs on three posts, with a part of its sand run through."""
     h, r, disc = height_m, 0.5 * width * height_m, 0.07 * height_m
     low, high, middle, bulb = disc - 0.001, h - disc + 0.001, 0.5 * h, 0.72 * r
     share = np.linspace(0, 1, 14)
@@ -136,7 +136,7 @@ def hourglass(*, height_m: float, width: float, neck_m: float, sand: float) -> M
 
 @template("paper towel")
 def paper_towel(*, height_m: float, width: float, core_m: float) -> Model:
-    """Build a roll of kitchen paper that stands on its end, its last sheet hanging down towards +X."""
+    """Build a roll of kitchen paper standing on its end, with its last sheet hanging down towards +X."""
     r = 0.5 * width * height_m
     model = Model().add("body", cylinder(r, height_m))
     sheet = arc(
@@ -152,7 +152,7 @@ def paper_towel(*, height_m: float, width: float, core_m: float) -> Model:
 
 
 def _oval(x_m: float, y_m: float) -> CrossSection:
-    """Return a rectangle whose shorter sides are half circles."""
+    """Return a rectangle whose shorter sides are semicircles."""
     turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, chords(SIDES) // 2)
     right = np.stack([0.5 * (x_m - y_m) + 0.5 * y_m * np.cos(turn), 0.5 * y_m * np.sin(turn)], axis=1)
     return polygon(np.concatenate([right, -right]))
@@ -160,7 +160,7 @@ def _oval(x_m: float, y_m: float) -> CrossSection:
 
 @template("soap dish")
 def soap_dish(*, length_m: float, width: float, height: float, wall_m: float) -> Model:
-    """Build an oval dish with ribs on its floor and holes that water runs off through."""
+    """Build an oval dish with ribs on its floor and drain holes."""
     across, high = width * length_m, height * length_m
     outline, hollow = _oval(length_m, across), _oval(length_m - 2 * wall_m, across - 2 * wall_m)
     floor = 1.6 * wall_m

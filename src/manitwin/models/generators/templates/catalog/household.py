@@ -1,4 +1,4 @@
-"""Things of a household: packages, baskets, brushes, rolls, candles, boards."""
+"""Household items: packages, baskets, brushes, rolls, candles, boards."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("box")
 def closed_box(*, height_m: float, width: float, depth: float) -> Model:
-    """Build a closed package that stands, its front towards -Y."""
+    """Build a standing closed package with its front towards -Y."""
     x, y = width * height_m, depth * height_m
     model = Model().add("body", box(x, y, height_m, radius_m=0.0008))
     model.region("front", "body", lambda centers: centers[:, 1] < -0.499 * y)
@@ -31,7 +31,7 @@ def closed_box(*, height_m: float, width: float, depth: float) -> Model:
 
 @template("basket")
 def basket(*, length_m: float, width: float, height: float, wall_m: float) -> Model:
-    """Build an open basket with slots in its walls and two grips."""
+    """Build an open basket with slots in its walls and two handles."""
     across, high = width * length_m, height * length_m
     outer = prism(rectangle(length_m, across, radius_m=0.02), high)
     inner = prism(rectangle(length_m - 2 * wall_m, across - 2 * wall_m, radius_m=0.017), high).translate(
@@ -52,7 +52,7 @@ def basket(*, length_m: float, width: float, height: float, wall_m: float) -> Mo
 
 @template("sponge")
 def sponge(*, length_m: float, width: float, thick: float) -> Model:
-    """Build a sponge lying with its scouring side up."""
+    """Build a lying sponge with its scouring side up."""
     across, high = width * length_m, thick * length_m
     model = Model().add("body", box(length_m, across, high - 0.004, radius_m=0.003))
     model.add(
@@ -162,7 +162,7 @@ def plunger(*, height_m: float, width_m: float, stick_m: float) -> Model:
 
 @template("dustpan")
 def dustpan(*, length_m: float, width: float, wall_m: float) -> Model:
-    """Build a dustpan lying on its floor: its lip towards +X, its handle towards -X."""
+    """Build a dustpan lying on its floor, with its lip towards +X and its handle towards -X."""
     across, long, high = width * length_m, 0.6 * length_m, 0.16 * length_m
     end = 0.5 * length_m
     side = polygon([(end - long, 0), (end, 0), (end, 0.006), (end - 0.8 * long, high), (end - long, high)])
@@ -213,7 +213,7 @@ def bell(*, height_m: float, width: float, wall_m: float) -> Model:
 
 @template("cutting board")
 def cutting_board(*, length_m: float, width: float, thick_m: float) -> Model:
-    """Build a board lying flat, with a hole to hang it by towards -X."""
+    """Build a lying board with a hanging hole towards -X."""
     across = width * length_m
     model = Model().add("body", prism(rectangle(length_m, across, radius_m=0.02), thick_m, radius_m=0.003))
     hole = prism(rectangle(0.018, 0.07, radius_m=0.0085), 3 * thick_m).translate((-0.44 * length_m, 0, -thick_m))
@@ -224,7 +224,7 @@ def cutting_board(*, length_m: float, width: float, thick_m: float) -> Model:
 
 @template("funnel")
 def funnel(*, height_m: float, width: float, spout: float, wall_m: float) -> Model:
-    """Build a funnel standing upside down on its mouth, as it is put down."""
+    """Build a funnel standing upside down on its mouth."""
     h, r, neck = height_m, 0.5 * width * height_m, (1 - spout) * height_m
     model = Model().add("cone", lathe([(0, 0), (r, 0), (r, 0.006), (0.0095, neck), (0.006, h), (0, h)]))
     model.cut(

@@ -1,4 +1,4 @@
-"""Instruments to measure, speak, take and fill with: long ones lie with their working end towards +X."""
+"""Instruments to measure, speak, grip and fill with: long ones lie with the working end towards +X."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from manitwin.models.generators.templates.template import Model, template
 
 
 def _lying(profile: list[Point], sides: int = 36) -> Manifold:
-    """Return a turned solid whose axis lies along X."""
+    """Return a solid of revolution whose axis lies along X."""
     return lathe(profile, sides=sides).rotate((0, 90, 0))
 
 
 @template("microphone")
 def microphone(*, length_m: float, head_m: float, grip: float) -> Model:
-    """Build a hand-held microphone that lies, its grille towards +X."""
+    """Build a lying hand-held microphone with its grille towards +X."""
     end, r = 0.5 * length_m, 0.5 * head_m
     neck, handle = end - 1.75 * r, grip * r
     turn = np.linspace(-0.95, 0.5 * np.pi, 16)
@@ -60,7 +60,7 @@ def microphone(*, length_m: float, head_m: float, grip: float) -> Model:
 
 @template("multimeter")
 def multimeter(*, length_m: float, width: float, thick_m: float, screen: float) -> Model:
-    """Build a multimeter that lies, its display towards +X, its sockets towards -X."""
+    """Build a lying multimeter with its display towards +X and its sockets towards -X."""
     across = width * length_m
     frame = box(length_m, across, thick_m, radius_m=0.2 * thick_m)
     model = Model().add("body", frame)
@@ -93,7 +93,7 @@ def multimeter(*, length_m: float, width: float, thick_m: float, screen: float) 
 
 @template("thermometer")
 def thermometer(*, length_m: float, width: float, thick_m: float) -> Model:
-    """Build a fever thermometer that lies, its probe towards +X."""
+    """Build a lying clinical thermometer with its probe towards +X."""
     end, half = 0.5 * length_m, 0.5 * width * length_m
     outline = polygon(
         [(-end, -0.8 * half), (-0.2 * end, -half), (0.3 * end, -0.6 * half), (0.86 * end, -0.0022), (0.86 * end, 0.0022),
@@ -113,7 +113,7 @@ def thermometer(*, length_m: float, width: float, thick_m: float) -> Model:
 
 @template("syringe")
 def syringe(*, length_m: float, width: float, drawn: float, needle_m: float) -> Model:
-    """Build a syringe that lies, its needle towards +X; the plunger is drawn out by ``drawn`` of the barrel."""
+    """Build a lying syringe with its needle towards +X; the plunger is drawn out by ``drawn`` of the barrel."""
     end, r = 0.5 * length_m, 0.5 * width * length_m
     barrel = (length_m - needle_m - 0.012) / (1 + drawn)
     front = end - needle_m - 0.01
@@ -138,7 +138,7 @@ def syringe(*, length_m: float, width: float, drawn: float, needle_m: float) -> 
 
 @template("tweezers")
 def tweezers(*, length_m: float, spread: float, width_m: float) -> Model:
-    """Build tweezers that lie on an edge of their arms, the tips towards +X."""
+    """Build tweezers lying on an edge of their arms, with the tips towards +X."""
     end, open_m = 0.5 * length_m, 0.5 * spread * length_m
     section = np.array([(-1, -0.24), (1, -0.24), (1, 0.24), (-1, 0.24)])
     model = Model()
@@ -161,7 +161,7 @@ def tweezers(*, length_m: float, spread: float, width_m: float) -> Model:
 
 @template("test tube")
 def test_tube(*, length_m: float, width: float, wall_m: float) -> Model:
-    """Build a test tube that lies, its open end towards +X."""
+    """Build a lying test tube with its open end towards +X."""
     end, r = 0.5 * length_m, 0.5 * width * length_m
 
     def capsule(radius: float, start: float, stop: float) -> list[Point]:
@@ -179,7 +179,7 @@ def test_tube(*, length_m: float, width: float, wall_m: float) -> Model:
 
 @template("alarm clock")
 def alarm_clock(*, height_m: float, width: float, depth: float, bell: float) -> Model:
-    """Build a clock with two bells that stands on two feet, its dial towards -Y; ``bell`` is a bell's width over the case's."""
+    """Build a clock with two bells on two feet, with its dial towards -Y; ``bell`` is a bell's width over the case's."""
     h = height_m
     r, deep = 0.5 * width * h, depth * h
     middle = 0.08 * h + r
@@ -193,7 +193,7 @@ def alarm_clock(*, height_m: float, width: float, depth: float, bell: float) -> 
         (0.88 * r, 0.94 * deep),
     ]
 
-    def facing(solid: Manifold) -> Manifold:  # drawn upward from its back, turned to look towards -Y
+    def facing(solid: Manifold) -> Manifold:  # built upward from its back, rotated to face -Y
         return solid.rotate((90, 0, 0)).translate((0, 0.5 * deep, middle))
 
     model = Model().add("body", facing(lathe(rounded([*case, (0, 0.94 * deep)], 0.004), sides=chords(72))))

@@ -1,4 +1,4 @@
-"""What is kept, won and hung up, and boxes for it and for tools: standing, the front towards -Y."""
+"""Souvenirs, prizes and ornaments, and boxes for jewellery and tools, standing with the front towards -Y."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("snow globe")
 def snow_globe(*, height_m: float, base: float, foot: float) -> Model:
-    """Build a ball of glass on a stepped base that is ``base`` of the height; ``foot`` is its width over the ball's."""
+    """Build a glass ball on a stepped base, which is ``base`` of the height; ``foot`` is its width relative to the ball's."""
     h, low = height_m, base * height_m
     r = 0.5 * (h - 0.86 * low)
     wide = foot * r
@@ -36,9 +36,9 @@ def snow_globe(*, height_m: float, base: float, foot: float) -> Model:
 
 @template("christmas ornament")
 def christmas_ornament(*, width_m: float, tall: float, cap: float, band: float) -> Model:
-    """Build a bauble that lies on its side as it comes to rest, its cap and wire loop towards +X.
+    """Build a bauble in its resting pose on its side, with its cap and wire loop towards +X.
 
-    ``tall`` is the ball's length over its width, ``cap`` the cap's width and ``band`` that of a band around it over its width.
+    ``tall`` is the ball's length, ``cap`` the cap's width and ``band`` the width of a band around it, all relative to its width.
     """
     r, half = 0.5 * width_m, 0.5 * tall * width_m
     model = Model().add("body", ellipsoid(2 * half, 2 * r, 2 * r))
@@ -56,7 +56,10 @@ def christmas_ornament(*, width_m: float, tall: float, cap: float, band: float) 
 
 @template("trophy")
 def trophy(*, height_m: float, width: float, base: float, bowl: float) -> Model:
-    """Build a cup with two ears on a block: ``base`` and ``bowl`` are their shares of the height, ``width`` the cup's over it."""
+    """Build a cup with two handles on a block.
+
+    ``base`` and ``bowl`` are their shares of the height; ``width`` is the cup's width relative to the height.
+    """
     h, r = height_m, 0.5 * width * height_m
     low, start, side = base * h, (1 - bowl) * h, 1.15 * width * height_m
     model = Model().add("pedestal", box(side, side, low, radius_m=0.003), "base")
@@ -96,7 +99,7 @@ def trophy(*, height_m: float, width: float, base: float, bowl: float) -> Model:
 
 @template("medal")
 def medal(*, width_m: float, thick: float, rim: float, ring: float) -> Model:
-    """Build a medal that lies, a raised rim and a star on it, the ring of its ribbon towards +X."""
+    """Build a lying medal with a raised rim and a star, and with the ring for its ribbon towards +X."""
     r, t = 0.5 * width_m, thick * width_m
     model = Model().add("body", cylinder(r, t))
     angle = np.linspace(0, 2 * np.pi, 10, endpoint=False)
@@ -114,7 +117,7 @@ def medal(*, width_m: float, thick: float, rim: float, ring: float) -> Model:
 
 @template("jewelry box")
 def jewelry_box(*, length_m: float, width: float, height: float, lid: float) -> Model:
-    """Build a closed chest whose lid, ``lid`` of its height, is hinged at +Y and latched towards -Y."""
+    """Build a closed chest whose lid, ``lid`` of its height, has its hinge at +Y and its latch towards -Y."""
     x, y, h = length_m, width * length_m, height * length_m
     split = (1 - lid) * h
     model = Model().add("body", box(x, y, h, radius_m=0.002))
@@ -134,7 +137,10 @@ def jewelry_box(*, length_m: float, width: float, height: float, lid: float) -> 
 
 @template("tool box")
 def tool_box(*, length_m: float, width: float, height: float, lid: float, handle: float) -> Model:
-    """Build a closed tool box with two latches towards -Y and a folded-up handle along X; ``handle`` rises over its height."""
+    """Build a closed tool box with two latches towards -Y and a raised handle along X.
+
+    ``handle`` is the height of the handle relative to the box's.
+    """
     x, y, h = length_m, width * length_m, height * length_m
     body = h / (1 + handle)
     split = (1 - lid) * body
@@ -157,7 +163,7 @@ def tool_box(*, length_m: float, width: float, height: float, lid: float, handle
 
 @template("glass ball")
 def glass_ball(*, width_m: float) -> Model:
-    """Build a ball of glass."""
+    """Build a glass ball."""
     model = Model().add("body", ellipsoid(width_m, width_m, width_m).translate((0, 0, 0.5 * width_m)))
     model.point("top", "surface", "body", (0.0, 0.0, width_m), (0.0, 0.0, 1.0))
     return model.point("side", "surface", "body", (0.0, -0.5 * width_m, 0.5 * width_m), (0.0, -1.0, 0.0))

@@ -1,4 +1,4 @@
-"""Small things of a kitchen. Long ones lie along X, the end that does the work towards +X."""
+"""Small kitchen items. Long ones lie along X with the working end towards +X."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("measuring spoon")
 def measuring_spoon(*, length_m: float, bowl: float, deep: float, grip: float) -> Model:
-    """Build a round bowl, its mouth up, on a flat handle with a hole; ``bowl`` is its width, ``deep`` its depth over that."""
+    """Build a round bowl, open at the top, on a flat handle with a hole.
+
+    ``bowl`` is the bowl's relative width, ``deep`` its depth relative to that.
+    """
     n, r = length_m, 0.5 * bowl * length_m
     high, wall, thick = deep * bowl * length_m, 0.0013, 0.0022
     at = 0.5 * n - r
@@ -35,7 +38,7 @@ def measuring_spoon(*, length_m: float, bowl: float, deep: float, grip: float) -
 
 @template("basting brush")
 def basting_brush(*, length_m: float, head: float, width: float, ferrule: float) -> Model:
-    """Build a flat brush lying: ``head`` is the bristles' share of its length, ``ferrule`` that of the band behind them."""
+    """Build a lying flat brush; ``head`` is the bristles' share of its length, ``ferrule`` that of the band behind them."""
     n, y = length_m, width * length_m
     start, band, thick = (0.5 - head) * n, ferrule * n, 0.22 * y
     half = [
@@ -63,7 +66,10 @@ def basting_brush(*, length_m: float, head: float, width: float, ferrule: float)
 
 @template("corkscrew")
 def corkscrew(*, length_m: float, handle: float, coil: float, turns: float) -> Model:
-    """Build a T of a bar of wood and a worm lying: ``handle`` is the bar's length over the whole, ``coil`` the worm's width."""
+    """Build a lying T of a wooden bar and a helix.
+
+    ``handle`` is the bar's length relative to the whole, ``coil`` the helix's width.
+    """
     n = length_m
     bar, thick = handle * n, 0.07 * n
     r = 0.5 * coil * n
@@ -100,7 +106,7 @@ def corkscrew(*, length_m: float, handle: float, coil: float, turns: float) -> M
 
 @template("egg carton")
 def egg_carton(*, length_m: float, width: float, height: float, cups: float) -> Model:
-    """Build a closed carton of pulp for two rows of ``cups`` eggs, its lid's bosses over them, the flap towards -Y."""
+    """Build a closed pulp carton for two rows of ``cups`` eggs, with bosses in its lid and the flap towards -Y."""
     x, y, h = length_m, width * length_m, height * length_m
     count, seam = max(round(cups), 2), 0.5 * height * length_m
     model = Model()
@@ -133,7 +139,7 @@ def egg_carton(*, length_m: float, width: float, height: float, cups: float) -> 
 
 @template("coffee pot")
 def moka_pot(*, height_m: float, width: float, waist: float, handle: float) -> Model:
-    """Build an eight-sided moka pot: a boiler, a jug with a spout towards -X on it, a lid with a knob, a handle towards +X."""
+    """Build an octagonal moka pot: a boiler, a jug with a spout towards -X, a lid with a knob, and a handle towards +X."""
     h, r = height_m, 0.5 * width * height_m
     top, middle = 0.9 * h, 0.44 * h
     boiler = lathe([(0, 0), (0.94 * r, 0), (r, 0.02 * h), (0.86 * r, middle), (0, middle)], sides=8)
@@ -175,7 +181,7 @@ def moka_pot(*, height_m: float, width: float, waist: float, handle: float) -> M
 
 @template("drinking straw")
 def drinking_straw(*, length_m: float, width: float, bore: float) -> Model:
-    """Build a straight straw lying."""
+    """Build a lying straight straw."""
     n, r = length_m, 0.5 * width * length_m
     model = Model().add("body", lying(cylinder(r, n, sides=chords(28)).translate((0, 0, -0.5 * n))))
     model.cut("bore", lying(cylinder(bore * r, 2 * n, sides=chords(28)).translate((0, 0, -n))), "")

@@ -1,4 +1,4 @@
-"""Kitchen tools held in one hand: lying as they are put down, the working end towards +X."""
+"""Kitchen tools held in one hand, lying with the working end towards +X."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("tongs")
 def tongs(*, length_m: float, spread: float, width_m: float, head: float) -> Model:
-    """Build tongs lying on their side, their arms ``spread`` of the length apart; ``head`` is the share of the jaws."""
+    """Build tongs lying on their side with arms ``spread`` of the length apart; ``head`` is the jaws' share of the length."""
     tail, end, half = -0.5 * length_m, 0.5 * length_m, 0.5 * spread * length_m
     start = end - head * length_m
     model = Model().add("joint", cylinder(0.009, width_m).translate((tail + 0.012, 0, -0.5 * width_m)), "handle")
@@ -49,7 +49,7 @@ def _loop(x_m: float, y_m: float, at_m: float) -> np.ndarray:
 
 @template("peeler")
 def peeler(*, length_m: float, blade: float, width_m: float) -> Model:
-    """Build a peeler with a long swivelling blade: a trough with a slit, in a bow of wire."""
+    """Build a peeler with a long swivelling blade (a trough with a slit) in a wire bow."""
     long, end, r = blade * length_m, 0.5 * length_m, 0.5 * width_m
     start = end - long
     ring = cylinder(r, long) - cylinder(r - 0.0011, 3 * long).translate((0, 0, -long))
@@ -84,7 +84,7 @@ def peeler(*, length_m: float, blade: float, width_m: float) -> Model:
 
 @template("bottle opener")
 def bottle_opener(*, length_m: float, head: float, thick_m: float) -> Model:
-    """Build a flat bar with an opening that takes a bottle's cap; ``head`` is its head's width over the length."""
+    """Build a flat bar with an opening for bottle caps; ``head`` is its head's width relative to the length."""
     wide, end = head * length_m, 0.5 * length_m
     at = end - 0.52 * wide
     turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
@@ -111,7 +111,7 @@ def bottle_opener(*, length_m: float, head: float, thick_m: float) -> Model:
 
 @template("can opener")
 def can_opener(*, length_m: float, spread: float, wheel_m: float) -> Model:
-    """Build a can opener lying flat: two handles towards -X, at the head a cutting wheel and above it the key that turns it."""
+    """Build a lying can opener: two handles towards -X, at the head a cutting wheel, and above it the key that turns it."""
     end, half, thick = 0.5 * length_m, 0.5 * spread * length_m, 0.0035
     at = end - 0.12 * length_m
     plate = [
@@ -172,7 +172,7 @@ def can_opener(*, length_m: float, spread: float, wheel_m: float) -> Model:
 
 @template("pizza cutter")
 def pizza_cutter(*, length_m: float, wheel: float, grip_m: float) -> Model:
-    """Build a wheel on a handle, lying flat; ``wheel`` is its diameter over the length."""
+    """Build a lying wheel on a handle; ``wheel`` is its diameter relative to the length."""
     r, end = 0.5 * wheel * length_m, 0.5 * length_m
     at, start = end - r, end - 2 * r
     disc = lathe([(0, -0.0006), (0.9 * r, -0.0006), (r, -0.00015), (r, 0.00015), (0.9 * r, 0.0006), (0, 0.0006)])
@@ -196,7 +196,7 @@ def pizza_cutter(*, length_m: float, wheel: float, grip_m: float) -> Model:
 
 @template("ice cream scoop")
 def ice_cream_scoop(*, length_m: float, bowl_m: float, deep: float) -> Model:
-    """Build a scoop with a deep round bowl, lying on it; ``deep`` is its depth over its width."""
+    """Build a scoop with a deep round bowl, lying on it; ``deep`` is its depth relative to its width."""
     end, low = 0.5 * length_m, deep * bowl_m
     at = end - 0.5 * bowl_m
     outer, inner = scoop(bowl_m, 0.95 * bowl_m, low, 0.0017)
@@ -226,7 +226,7 @@ def masher(*, length_m: float, plate_m: float, head: float) -> Model:
         for u in range(-6, 7)
         for v in range(-6, 7)
         if np.hypot(u * 0.0135 / (0.82 * r), v * 0.0135 / r) < 0.84
-        and np.hypot(u * 0.0135, abs(v) * 0.0135 - 0.6 * r) > 0.009  # where the fork holds it
+        and np.hypot(u * 0.0135, abs(v) * 0.0135 - 0.6 * r) > 0.009  # where the fork is attached
     ]
     plate = (disc - union(holes)).rotate((0, 90, 0)).translate((end - 0.0022, 0, 0))
     model = Model().add("head", plate.rotate((0, -lean, 0)), "head")
@@ -250,7 +250,7 @@ def masher(*, length_m: float, plate_m: float, head: float) -> Model:
 
 @template("pestle")
 def pestle(*, length_m: float, head_m: float, waist: float) -> Model:
-    """Build a club-shaped pestle lying along X, its grinding end towards +X; ``waist`` is its thinnest place over its head."""
+    """Build a club-shaped pestle lying along X, with its grinding end to +X; ``waist`` is its smallest width over its head's."""
     r, end = 0.5 * head_m, 0.5 * length_m
     side = [
         (0.0, -end),
@@ -270,7 +270,7 @@ def pestle(*, length_m: float, head_m: float, waist: float) -> Model:
 
 @template("honey dipper")
 def honey_dipper(*, length_m: float, head: float, width_m: float) -> Model:
-    """Build a dipper lying along X: a head of turned discs at +X, ``head`` of the length."""
+    """Build a dipper lying along X, with a head of turned discs at +X that takes ``head`` of the length."""
     r, end, long = 0.5 * width_m, 0.5 * length_m, head * length_m
     start, rings = end - long, 7
     profile = [(0.0, -end), (0.0045, -end + 0.001), (0.0048, -end + 0.01), (0.0036, start - 0.01), (0.0045, start)]

@@ -1,4 +1,4 @@
-"""Shapes of grown things, which several builders share: smooth bodies of revolution, ribs, stalks, green leaves."""
+"""Shapes of plants shared by several builders: smooth bodies of revolution, ribs, stalks, leaves."""
 
 from __future__ import annotations
 
@@ -16,18 +16,21 @@ Radii = Callable[[np.ndarray], np.ndarray]
 def turned(
     profile: Sequence[Point], width_m: float, height_m: float, *, samples: int = 36, sides: int = SIDES
 ) -> Manifold:
-    """Return a smooth curve through points of (radius over half the width, z over the height) turned about Z."""
+    """Return the body of revolution about Z of a smooth curve through points.
+
+    A point is (radius over half the width, z over the height).
+    """
     curve = arc([(r * width_m / 2, 0.0, z * height_m) for r, z in profile], samples=samples)
     return lathe(curve[:, [0, 2]], sides=chords(sides))
 
 
 def lying(solid: Manifold) -> Manifold:
-    """Return a solid whose axis Z is laid along +X."""
+    """Return a solid rotated so that its axis Z lies along +X."""
     return solid.rotate((0, 90, 0))
 
 
 def ribbed(solid: Manifold, scale: Radii) -> Manifold:
-    """Return a solid whose distance from the axis Z is scaled by a function of the angle about it (N,) in rad."""
+    """Return a solid whose distances from the axis Z are scaled by a function of the azimuth ``(N,)`` in rad."""
 
     def moved(vertices: np.ndarray) -> np.ndarray:
         angle = np.arctan2(vertices[:, 1], vertices[:, 0])
@@ -37,7 +40,7 @@ def ribbed(solid: Manifold, scale: Radii) -> Manifold:
 
 
 def furrow(depth: float, half_width_rad: float, toward_rad: float) -> Radii:
-    """Return scales for ``ribbed``: a furrow of a depth, in radii, along the side that an angle about Z looks to."""
+    """Return a scale function for ``ribbed``: a furrow of ``depth`` (in radii) along the side at azimuth ``toward_rad``."""
 
     def scale(angle: np.ndarray) -> np.ndarray:
         off = np.abs(np.angle(np.exp(1j * (angle - toward_rad))))
@@ -47,7 +50,7 @@ def furrow(depth: float, half_width_rad: float, toward_rad: float) -> Radii:
 
 
 def stalk(points: Sequence[Sequence[float]], start_m: float, end_m: float, *, sides: int = 10) -> Manifold:
-    """Return a thin bent stalk through points, of radii that change from its start to its end."""
+    """Return a thin curved stalk through points, with a radius that changes from ``start_m`` to ``end_m``."""
     path = arc(points, samples=10)
     return tube(path, np.linspace(start_m, end_m, len(path)), sides=sides)
 

@@ -1,4 +1,4 @@
-"""Packages of food, drink and small goods: cartons, cups, tubes, tins and flasks, closed and with what is in them."""
+"""Closed packages of food, drink and small goods with their contents: cartons, cups, tubes, tins and flasks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("milk carton")
 def milk_carton(*, height_m: float, width: float, depth: float, gable: float) -> Model:
-    """Build a carton with a gabled top, its screw cap on the slope towards -Y."""
+    """Build a carton with a gabled top and a screw cap on the slope towards -Y."""
     x, y = width * height_m, width * depth * height_m
     fin = 0.42 * gable * height_m
     shoulder, ridge = (1 - gable) * height_m, height_m - fin
@@ -58,7 +58,7 @@ def milk_carton(*, height_m: float, width: float, depth: float, gable: float) ->
 
 @template("yogurt cup")
 def yogurt_cup(*, height_m: float, width: float, taper: float) -> Model:
-    """Build a cup that widens upwards under a foil lid with a tab towards -Y."""
+    """Build a cup that widens upwards, with a foil lid whose tab points to -Y."""
     r, top = 0.5 * width * height_m, height_m - 0.0008
     foot = taper * r
     profile = [
@@ -88,7 +88,7 @@ def yogurt_cup(*, height_m: float, width: float, taper: float) -> Model:
 
 @template("chips can")
 def chips_can(*, height_m: float, width: float, lid_m: float) -> Model:
-    """Build a tall tube of board with a metal bottom and a plastic lid."""
+    """Build a tall cardboard tube with a metal bottom and a plastic lid."""
     r, start = 0.5 * width * height_m, height_m - lid_m
     model = Model().add("body", cylinder(0.975 * r, start - 0.002).translate((0, 0, 0.0035)))
     model.add(
@@ -112,7 +112,7 @@ def chips_can(*, height_m: float, width: float, lid_m: float) -> Model:
 
 @template("canister tin")
 def canister_tin(*, length_m: float, width: float, thick: float, corner: float) -> Model:
-    """Build a flat tin with a hinged lid, the hinge towards +Y."""
+    """Build a flat tin with a hinged lid; the hinge is towards +Y."""
     across, high = width * length_m, thick * length_m
     radius = corner * across
     split = 0.56 * high
@@ -129,7 +129,7 @@ def canister_tin(*, length_m: float, width: float, thick: float, corner: float) 
 
 @template("dropper bottle")
 def dropper_bottle(*, height_m: float, width: float, bulb: float, neck: float) -> Model:
-    """Build a small bottle with a pipette: a collar to turn and a rubber bulb to squeeze."""
+    """Build a small bottle with a pipette, which has a screw collar and a rubber bulb."""
     r, h = 0.5 * width * height_m, height_m
     rubber, collar = bulb * h, 0.13 * h
     shoulder, narrow = h - rubber - collar, neck * r
@@ -181,7 +181,7 @@ def dropper_bottle(*, height_m: float, width: float, bulb: float, neck: float) -
 
 @template("playing cards")
 def playing_cards(*, length_m: float, width: float, thick: float) -> Model:
-    """Build a pack of cards in its box, lying on its back, the flap towards +X."""
+    """Build a pack of cards in its box, lying on its back with the flap towards +X."""
     across, high = width * length_m, thick * length_m
     model = Model().add("body", box(length_m, across, high, radius_m=0.0008))
     model.region("flap", "body", lambda centers: centers[:, 0] > 0.499 * length_m, "flap")
@@ -203,7 +203,7 @@ def playing_cards(*, length_m: float, width: float, thick: float) -> Model:
 
 @template("glasses case")
 def glasses_case(*, length_m: float, width: float, thick: float) -> Model:
-    """Build a hard case that lies closed, its lid up, the opening edge towards -Y."""
+    """Build a closed lying hard case with its lid up and the opening edge towards -Y."""
     across, high = width * length_m, thick * length_m
     reach = 0.5 * (length_m - across)
     ends = [ellipsoid(across, across, 1.16 * high).translate((side * reach, 0, 0.42 * high)) for side in (-1.0, 1.0)]
@@ -221,7 +221,7 @@ def glasses_case(*, length_m: float, width: float, thick: float) -> Model:
 
 @template("matchbox")
 def matchbox(*, length_m: float, width: float, thick: float, drawn: float) -> Model:
-    """Build a matchbox lying flat, its drawer pulled out towards +X by ``drawn`` of its length, matches in it."""
+    """Build a lying matchbox with matches, its drawer pulled out towards +X by ``drawn`` of its length."""
     n, y, z = length_m, width * length_m, thick * length_m
     card, out = 0.0006, drawn * length_m
     model = Model().add("body", box(n, y, z, radius_m=0.0004))
@@ -229,7 +229,7 @@ def matchbox(*, length_m: float, width: float, thick: float, drawn: float) -> Mo
         strip = box(n - 0.002, 0.0006, 0.8 * z).translate((0, side * (0.5 * y - 0.0002), 0.1 * z))
         model.add("striking side", strip, "striking side")
     inner_y, inner_z = y - 2 * card, z - 2 * card
-    for side in (-1.0, 1.0):  # the drawer's end stands back at -X, and is seen at +X
+    for side in (-1.0, 1.0):  # the drawer is recessed at -X and visible at +X
         model.cut("mouth", box(0.004, inner_y, inner_z).translate((side * 0.5 * n, 0, card)), "drawer")
     drawer = box(out + 0.006, inner_y - 0.0004, inner_z - 0.0004).translate((0.5 * n + 0.5 * out - 0.003, 0, card))
     model.add("drawer", drawer, "drawer")
@@ -256,7 +256,10 @@ def matchbox(*, length_m: float, width: float, thick: float, drawn: float) -> Mo
 
 @template("food container")
 def food_container(*, length_m: float, width: float, height: float, taper: float, lid: float) -> Model:
-    """Build a closed container with a lid that four clips hold; ``taper`` is its floor over its mouth, ``lid`` a share."""
+    """Build a closed container whose lid is held by four clips.
+
+    ``taper`` is the floor's width relative to the opening's, ``lid`` the lid's share of the height.
+    """
     n, y, h = length_m, width * length_m, height * length_m
     brim = (1 - lid) * h
     radius = 0.16 * y

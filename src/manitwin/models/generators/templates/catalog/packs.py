@@ -1,4 +1,4 @@
-"""Packs as shops sell them: boxes of board, cans and tins, jars, bottles. Full solids, but for a flask that stands open."""
+"""Retail packs: cardboard boxes, cans and tins, jars, bottles. All are full solids except an open flask."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manitwin.models.generators.templates.catalog.vessel import hollowed
 from manitwin.models.generators.templates.template import Model, template
 
 BEAD_M = 0.0018
-"""The rolled seam of a tin, beyond its wall."""
+"""How far the rolled seam of a tin protrudes from its wall, metres."""
 
 
 @template("cereal box")
@@ -28,14 +28,14 @@ BEAD_M = 0.0018
 @template("toothpaste box")
 @template("cosmetic box")
 def printed_box(*, height_m: float, width: float, depth: float) -> Model:
-    """Build a closed box of printed board that stands, its front towards -Y, with flaps glued at both ends."""
+    """Build a standing closed box of printed cardboard, with its front towards -Y and flaps glued at both ends."""
     x, y = width * height_m, depth * height_m
     model = Model().add("body", box(x, y, height_m, radius_m=0.0006))
     model.region("front", "body", lambda centers: centers[:, 1] < -0.499 * y, "front")
     model.region("back", "body", lambda centers: centers[:, 1] > 0.499 * y, "front")
     model.region("top", "body", lambda centers: centers[:, 2] > 0.999 * height_m)
     model.region("base", "body", lambda centers: centers[:, 2] < 0.001 * height_m)
-    if x > height_m:  # it is opened at an end
+    if x > height_m:  # it opens at an end
         model.region("flap", "body", lambda centers: abs(centers[:, 0]) > 0.499 * x)
     model.point("front", "face", "front", (0.0, -0.5 * y, 0.5 * height_m), (0.0, -1.0, 0.0))
     model.point("top", "face", "top", (0.0, 0.0, height_m), (0.0, 0.0, 1.0))
@@ -44,7 +44,7 @@ def printed_box(*, height_m: float, width: float, depth: float) -> Model:
 
 @template("cigarette pack")
 def flip_top_pack(*, height_m: float, width: float, depth: float, lid: float) -> Model:
-    """Build a pack with a hinged lid, ``lid`` of its height at the front, that slants down to its hinge at the back."""
+    """Build a pack with a hinged lid, which takes ``lid`` of its height in front and slants down to its hinge at the back."""
     x, y, h = width * height_m, depth * height_m, height_m
     model = Model().add("body", box(x, y, h, radius_m=0.0008))
     low, back = (1 - lid) * h, (1 - 0.55 * lid) * h
@@ -62,7 +62,7 @@ def flip_top_pack(*, height_m: float, width: float, depth: float, lid: float) ->
 @template("tuna can")
 @template("pet food can")
 def low_can(*, height_m: float, width: float) -> Model:
-    """Build a low can with seams above and below, a paper label around it and a ring on its lid."""
+    """Build a low can with seams at both ends, a paper label around it and a ring on its lid."""
     h, r = height_m, 0.5 * width * height_m
     wall = r - BEAD_M
     side = [(0, 0.002), (wall - 0.001, 0.002), (wall, 0.0), (r, 0.0), (r, 0.003), (wall, 0.0045)]
@@ -81,7 +81,7 @@ def low_can(*, height_m: float, width: float) -> Model:
 @template("coffee can")
 @template("tea tin")
 def lidded_tin(*, height_m: float, width: float, lid: float) -> Model:
-    """Build a tall tin with a lid pressed on that is ``lid`` of its height."""
+    """Build a tall tin with a press-on lid, which takes ``lid`` of its height."""
     h, r = height_m, 0.5 * width * height_m
     low = (1 - lid) * h
     body = [(0, 0.002), (r - 0.004, 0.002), (r - BEAD_M, 0.0), (r, 0.0), (r, 0.003), (r - 0.0008, 0.0045)]
@@ -96,7 +96,7 @@ def lidded_tin(*, height_m: float, width: float, lid: float) -> Model:
 @template("sardine can")
 @template("canned meat")
 def oblong_tin(*, length_m: float, width: float, height: float, corner: float) -> Model:
-    """Build an oblong tin with round corners, seams above and below and a ring on its lid; ``corner`` is of its width."""
+    """Build an oblong tin with rounded corners, seams at both ends and a ring on its lid; ``corner`` is relative to its width."""
     x, y, h = length_m, width * length_m, height * length_m
     radius, wall = corner * y, 2 * BEAD_M
     model = Model().add(
@@ -117,7 +117,7 @@ def oblong_tin(*, length_m: float, width: float, height: float, corner: float) -
 
 
 def _labelled(model: Model, low_m: float, high_m: float) -> Model:
-    """Give the body's wall between two heights, at which its profile has points, the looks of a label."""
+    """Give the body's wall between two heights, at which its profile has points, the look of a label."""
     return model.region("label", "body", lambda centers: (centers[:, 2] > low_m) & (centers[:, 2] < high_m), "label")
 
 
@@ -129,9 +129,9 @@ def _labelled(model: Model, low_m: float, high_m: float) -> Model:
 @template("mason jar")
 @template("ink bottle")
 def labelled_jar(*, height_m: float, width: float, neck: float, cap: float, label: float) -> Model:
-    """Build a jar with a screwed lid and a label around it.
+    """Build a jar with a screw lid and a label around it.
 
-    ``label`` is its share of the body's height, ``neck`` the lid's width over the body's.
+    ``label`` is the label's share of the body's height, ``neck`` the lid's width relative to the body's.
     """
     h, r = height_m, 0.5 * width * height_m
     top, n = (1 - cap) * h, neck * r
@@ -144,7 +144,7 @@ def labelled_jar(*, height_m: float, width: float, neck: float, cap: float, labe
 @template("oil bottle")
 @template("vinegar bottle")
 def tall_bottle(*, height_m: float, width: float, shoulder: float, neck: float, cap: float, label: float) -> Model:
-    """Build a slender bottle with a long neck and a label around it, ``label`` of the height below its shoulder."""
+    """Build a slender bottle with a long neck and a label, which takes ``label`` of the height below its shoulder."""
     h, r = height_m, 0.5 * width * height_m
     n, top, side = max(neck * r, 0.009), (1 - cap) * h, shoulder * h
     low, high = (0.48 - 0.5 * label) * side, (0.48 + 0.5 * label) * side
@@ -155,7 +155,7 @@ def tall_bottle(*, height_m: float, width: float, shoulder: float, neck: float, 
 
 @template("glue bottle")
 def glue_bottle(*, height_m: float, width: float, flat: float, shoulder: float, neck: float, cap: float) -> Model:
-    """Build an oval bottle that is squeezed, with a pointed nozzle to turn; ``flat`` is its depth over its width."""
+    """Build an oval squeeze bottle with a pointed screw nozzle; ``flat`` is its depth relative to its width."""
     h, r = height_m, 0.5 * width * height_m
     top, n = (1 - cap) * h, max(neck * r, 0.007)
     low = shoulder * top
@@ -163,7 +163,7 @@ def glue_bottle(*, height_m: float, width: float, flat: float, shoulder: float, 
     body = lathe([(0.0, 0.0), *outline, (0.0, top)])
 
     def flattened(vertices: np.ndarray) -> np.ndarray:
-        """Flatten the sides, less and less towards the neck, which stays round."""
+        """Flatten the sides, decreasingly towards the neck, which stays round."""
         neckward = np.clip((vertices[:, 2] - low) / (0.97 * top - low), 0.0, 1.0)
         return np.column_stack([vertices[:, 0], vertices[:, 1] * (flat + (1 - flat) * neckward), vertices[:, 2]])
 
@@ -184,7 +184,7 @@ def glue_bottle(*, height_m: float, width: float, flat: float, shoulder: float, 
 
 @template("laboratory flask")
 def conical_flask(*, height_m: float, width: float, neck: float, slope: float, wall_m: float) -> Model:
-    """Build an open conical flask: ``neck`` is its mouth over its foot, ``slope`` the cone's share of its height."""
+    """Build an open conical flask; ``neck`` is its mouth relative to its foot, ``slope`` the cone's share of its height."""
     h, r = height_m, 0.5 * width * height_m
     n = max(neck * r, 0.009)
     profile = rounded([(0.93 * r, 0.0), (r, 0.05 * h), (n, slope * h), (n, 0.97 * h), (1.16 * n, h)], 0.02 * h)

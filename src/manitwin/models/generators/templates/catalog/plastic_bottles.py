@@ -1,4 +1,4 @@
-"""Bottles of soft plastic that are no bodies of revolution: squeezed ones, and jugs that are held through a hole. Full solids."""
+"""Soft plastic bottles that are no bodies of revolution: squeeze bottles, and jugs with a handle. Full solids."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ LEAST_NECK_M = 0.009
 def ketchup_bottle(
     *, height_m: float, width: float, flat: float, waist: float, shoulder: float, neck: float, cap: float
 ) -> Model:
-    """Build an oval bottle that is squeezed, with a nozzle on its cap.
+    """Build an oval squeeze bottle with a nozzle on its cap.
 
-    ``flat`` is its depth over its width, ``waist`` the width where it is held over the widest, ``shoulder`` the share of the
-    body's height from which on it narrows, ``neck`` the cap's foot over the width.
+    ``flat`` is its depth relative to its width, ``waist`` the width at the grip relative to the largest, ``shoulder`` the
+    relative height of the body above which it narrows, ``neck`` the width of the cap's foot relative to the bottle's.
     """
     h, r = height_m, 0.5 * width * height_m
     top, n = (1 - cap) * h, max(neck * r, LEAST_NECK_M)
@@ -36,10 +36,10 @@ def ketchup_bottle(
 def detergent_bottle(
     *, height_m: float, width: float, flat: float, shoulder: float, neck: float, grip: float, cap: float
 ) -> Model:
-    """Build a jug of flat sides, its cap towards -X, and towards +X a handle behind a hole.
+    """Build a flat-sided jug with its cap towards -X, and with a handle behind a hole towards +X.
 
-    ``flat`` is its depth over its width, ``shoulder`` where its far side begins to slope over the body's height, ``neck`` the
-    cap's width and ``grip`` the hole's width over the body's.
+    ``flat`` is its depth relative to its width, ``shoulder`` the relative height of the body where its far side begins to slope,
+    ``neck`` the cap's width and ``grip`` the hole's width relative to the body's.
     """
     h, w = height_m, width * height_m
     top, end, n = (1 - cap) * h, 0.5 * width * height_m, max(0.5 * neck * width * height_m, LEAST_NECK_M)

@@ -1,4 +1,4 @@
-"""More toys: cups to stack, tiles, wands, things that spin or are blown."""
+"""Further toys: stacking cups, tiles, wands, and toys to spin or to blow."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("stacking cup")
 def stacking_cup(*, height_m: float, width: float, taper: float, wall_m: float, lip: float) -> Model:
-    """Build an open cup with a thick lip, ``lip`` of its height; ``taper`` is its foot's width over its mouth's."""
+    """Build an open cup with a thick lip of ``lip`` of its height; ``taper`` is its foot's width relative to its mouth's."""
     r, h = 0.5 * width * height_m, height_m
     edge = (1 - lip) * h
     profile = rounded(
@@ -36,7 +36,7 @@ def stacking_cup(*, height_m: float, width: float, taper: float, wall_m: float, 
 
 @template("mahjong tile")
 def mahjong_tile(*, length_m: float, width: float, thick: float, back: float) -> Model:
-    """Build a tile lying, its face up and its coloured back below, ``back`` of its thickness; three circles are cut in."""
+    """Build a lying tile with its face up, engraved with three circles; its coloured back takes ``back`` of its thickness."""
     n, y, t = length_m, width * length_m, thick * length_m
     whole = prism(rectangle(n, y, radius_m=0.1 * y), t, radius_m=0.08 * y)
     model = Model().add("body", whole)
@@ -52,7 +52,7 @@ def mahjong_tile(*, length_m: float, width: float, thick: float, back: float) ->
 
 @template("fidget spinner")
 def fidget_spinner(*, width_m: float, thick: float, lobe: float, hub: float) -> Model:
-    """Build three lobes with weights about a bearing with a button, lying; ``lobe`` and ``hub`` are widths over the whole."""
+    """Build a lying spinner with three weighted lobes about a bearing; ``lobe`` and ``hub`` are widths over the whole."""
     reach, t = 0.5 * width_m * (1 - lobe) / 0.933, thick * width_m
     r, core = 0.5 * lobe * width_m, 0.5 * hub * width_m
     angles = np.radians([90.0, 210.0, 330.0])
@@ -108,7 +108,10 @@ def fidget_spinner(*, width_m: float, thick: float, lobe: float, hub: float) -> 
 
 @template("whistle")
 def whistle(*, length_m: float, drum: float, width: float, bore: float) -> Model:
-    """Build a whistle lying on its drum, its mouthpiece towards +X: ``drum`` and ``width`` are of its drum over the length."""
+    """Build a whistle lying on its drum with its mouthpiece towards +X.
+
+    ``drum`` and ``width`` of the drum are relative to the length.
+    """
     n, r, y = length_m, 0.5 * drum * length_m, width * length_m
     round_part = (
         cylinder(r, y, sides=chords(48)).translate((0, 0, -0.5 * y)).rotate((90, 0, 0)).translate((r - 0.5 * n, 0, 0))
@@ -129,7 +132,7 @@ def whistle(*, length_m: float, drum: float, width: float, bore: float) -> Model
 @template("baton")
 @template("magic wand")
 def wand(*, length_m: float, width: float, tip: float, grip: float) -> Model:
-    """Build a stick with ends of another colour, lying: ``tip`` and ``grip`` are their shares of the length."""
+    """Build a lying stick with ends of another colour; ``tip`` and ``grip`` are their shares of the length."""
     n, r = length_m, 0.5 * width * length_m
     model = Model().add(
         "body", lying(cylinder(0.92 * r, n - 0.002, sides=chords(32)).translate((0, 0, -0.5 * n + 0.001)))
@@ -150,7 +153,7 @@ def wand(*, length_m: float, width: float, tip: float, grip: float) -> Model:
 
 @template("squash ball")
 def squash_ball(*, width_m: float, dot: float) -> Model:
-    """Build a small rubber ball with a coloured ``dot`` up, of its width."""
+    """Build a small rubber ball with a coloured dot on top; ``dot`` is the dot's relative width."""
     r = 0.5 * width_m
     model = Model().add("body", ellipsoid(width_m, width_m, width_m).translate((0, 0, r)))
     model.region(
@@ -162,7 +165,7 @@ def squash_ball(*, width_m: float, dot: float) -> Model:
 
 @template("harmonica")
 def harmonica(*, length_m: float, deep: float, height: float, holes: float) -> Model:
-    """Build a mouth organ lying, its row of ``holes`` towards -Y between two covers."""
+    """Build a lying harmonica with a row of ``holes`` towards -Y between two covers."""
     n, y, h = length_m, deep * length_m, height * length_m
     model = Model().add("body", box(0.98 * n, 0.96 * y, 0.42 * h).translate((0, 0, 0.29 * h)))
     side = [(-0.4 * y, 0.0), (0.5 * y, 0.0), (0.5 * y, 0.3 * h), (0.2 * y, 0.33 * h), (-0.28 * y, 0.18 * h)]
@@ -183,7 +186,10 @@ def harmonica(*, length_m: float, deep: float, height: float, holes: float) -> M
 
 @template("flute")
 def recorder(*, length_m: float, width: float, beak: float, foot: float) -> Model:
-    """Build a recorder lying, its mouthpiece towards +X: ``beak`` is its share of the length, ``foot`` the bell's width."""
+    """Build a lying recorder with its mouthpiece towards +X.
+
+    ``beak`` is the mouthpiece's share of the length, ``foot`` the bell's width relative to the tube's.
+    """
     n, r = length_m, 0.5 * width * length_m
     neck = (0.5 - beak) * n
     side = [

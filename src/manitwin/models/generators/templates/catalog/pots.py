@@ -1,4 +1,4 @@
-"""Vessels to cook, carry and keep things in: pots, pans, buckets, pots for plants, holders."""
+"""Vessels to cook, carry and store in: pots, pans, buckets, flower pots, holders."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("frying pan")
 def frying_pan(*, width_m: float, height: float, wall_m: float, handle: float) -> Model:
-    """Build a pan whose handle reaches out to +X by ``handle`` of its width."""
+    """Build a pan whose handle extends to +X by ``handle`` of its width."""
     model, radius, high = Model(), 0.5 * width_m, height * width_m
     profile = rounded([(0.78 * radius, 0.0), (0.8 * radius, 0.002), (radius, high)], 0.01)
     grip = stick(model, radius, 0.8 * high, handle * width_m, 0.45 * high, 0.0125)
@@ -44,7 +44,7 @@ def wok(*, width_m: float, height: float, wall_m: float, handle: float) -> Model
 
 @template("pot")
 def pot(*, width_m: float, height: float, wall_m: float, ears: float) -> Model:
-    """Build a pot with two ears along X that reach out by ``ears`` of its width."""
+    """Build a pot with two handles along X that protrude by ``ears`` of its width."""
     model, radius, high = Model(), 0.5 * width_m, height * width_m
     handles = []
     for side in (1.0, -1.0):
@@ -66,7 +66,7 @@ def pot(*, width_m: float, height: float, wall_m: float, ears: float) -> Model:
 
 @template("pot lid")
 def pot_lid(*, width_m: float, dome: float, wall_m: float, knob_m: float) -> Model:
-    """Build a domed lid with a knob, lying as it covers a pot."""
+    """Build a domed lid with a knob, in the pose in which it covers a pot."""
     radius, high = 0.5 * width_m, dome * width_m
     turn = np.linspace(0, np.pi / 2, 14)
     cap = [(float(radius * np.cos(a)), float(0.006 + high * np.sin(a))) for a in turn]
@@ -92,7 +92,7 @@ def pot_lid(*, width_m: float, dome: float, wall_m: float, knob_m: float) -> Mod
 
 @template("bucket")
 def bucket(*, height_m: float, width: float, taper: float, wall_m: float) -> Model:
-    """Build a bucket whose bow stands upright over it."""
+    """Build a bucket whose bail stands upright above it."""
     model, radius = Model(), 0.5 * width * height_m
     profile = rounded([(taper * radius, 0.0), (taper * radius, 0.002), (radius, height_m)], 0.004)
     lugs = [(side * 0.99 * radius, 0.0, 0.92 * height_m) for side in (-1.0, 1.0)]
@@ -112,7 +112,7 @@ def bucket(*, height_m: float, width: float, taper: float, wall_m: float) -> Mod
 
 @template("flower pot")
 def flower_pot(*, height_m: float, width: float, taper: float, wall_m: float) -> Model:
-    """Build a pot with a band round its mouth and a hole in its floor."""
+    """Build a pot with a band around its mouth and a hole in its floor."""
     h, r = height_m, 0.5 * width * height_m
     slope = (1 - taper) * r / h
     profile = [(taper * r, 0.0), (taper * r + 0.78 * h * slope - 0.0, 0.78 * h), (r, 0.8 * h), (r * 1.01, h)]
@@ -138,7 +138,7 @@ def pen_holder(*, height_m: float, width: float, wall_m: float, taper: float) ->
 
 @template("candle holder")
 def candle_holder(*, height_m: float, foot: float, cup_m: float) -> Model:
-    """Build a candlestick: a foot, a stem and a socket for a candle of 22 mm."""
+    """Build a candlestick: a foot, a stem and a socket for a candle 22 mm in diameter."""
     h, r, low = height_m, max(0.5 * foot * height_m, 0.032), height_m - 0.03
     stem = [(0.006, 0.35 * low), (0.009, 0.65 * low), (0.007, 0.95 * low)]
     body = rounded([(r, 0.0), (r, 0.004), (0.4 * r, 0.01), *stem, (0.5 * cup_m, low + 0.006), (0.5 * cup_m, h)], 0.005)
@@ -165,7 +165,7 @@ def mortar(*, width_m: float, height: float, wall_m: float, foot: float) -> Mode
 
 @template("vase")
 def vase(*, height_m: float, width: float, neck: float, mouth: float, wall_m: float) -> Model:
-    """Build a vase: the ``neck`` and the ``mouth`` are shares of its largest width."""
+    """Build a vase; the ``neck`` and the ``mouth`` are shares of its largest width."""
     h, r = height_m, 0.5 * width * height_m
     levels = np.linspace(0, 1, 26)
     radii = np.interp(levels, [0, 0.12, 0.38, 0.6, 0.8, 0.9, 1], [0.6, 0.78, 1.0, 0.8, neck, neck * 1.05, mouth])
@@ -176,7 +176,7 @@ def vase(*, height_m: float, width: float, neck: float, mouth: float, wall_m: fl
 
 @template("watering can")
 def watering_can(*, height_m: float, width: float, spout: float, wall_m: float) -> Model:
-    """Build a can with a long spout towards -X and an ear towards +X."""
+    """Build a can with a long spout towards -X and a handle towards +X."""
     model, h, r = Model(), height_m, 0.5 * width * height_m
     profile = rounded([(0.95 * r, 0.0), (r, 0.006), (0.9 * r, h)], 0.008)
     reach = r + spout * h

@@ -1,4 +1,4 @@
-"""Kitchen presses: one that stands and presses coffee, one that lies and presses garlic."""
+"""Kitchen presses: a standing coffee press and a lying garlic press."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("french press")
 def french_press(*, height_m: float, width: float, knob: float, spout: float, wall_m: float) -> Model:
-    """Build a coffee press with its plunger up: a glass in a frame, its spout towards -X, its handle towards +X.
+    """Build a coffee press with its plunger up: a glass in a frame, with spout towards -X and handle towards +X.
 
-    ``knob`` is the share of the height that rod and knob stick out of the lid, ``spout`` the lip's reach over the radius.
+    ``knob`` is the share of the height by which rod and knob protrude from the lid, ``spout`` the lip's length relative to the
+    radius.
     """
     r, top = 0.5 * width * height_m, (1 - knob) * height_m
     h, foot = 0.9 * top, 0.035 * top
@@ -56,9 +57,9 @@ def french_press(*, height_m: float, width: float, knob: float, spout: float, wa
 
 @template("garlic press")
 def garlic_press(*, length_m: float, spread: float, chamber_m: float) -> Model:
-    """Build a garlic press that rests on its chamber, which is at +X with its holes below, two handles towards -X.
+    """Build a garlic press resting on its chamber, which is at +X with its holes below, with two handles towards -X.
 
-    ``spread`` is how far apart the ends of the handles are, over the length.
+    ``spread`` is the distance between the ends of the handles relative to the length.
     """
     end, r, deep = 0.5 * length_m, 0.5 * chamber_m, 0.024
     at, wall = end - 0.022 - r, 0.0016

@@ -1,4 +1,4 @@
-"""Roots and bulbs: bulbs stand with their neck up, roots lie with their leaves' end towards +X."""
+"""Roots and bulbs: bulbs stand with their neck up, roots lie with the end of their leaves towards +X."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("garlic")
 def garlic(*, width_m: float, tall: float, cloves: float, neck: float) -> Model:
-    """Build a bulb of garlic that stands on its roots; ``cloves`` is how deep they show, ``neck`` its height over the width."""
+    """Build a bulb of garlic standing on its roots.
+
+    ``cloves`` is the depth of the grooves between cloves, ``neck`` the neck's height relative to the width.
+    """
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.0), (0.22, 0.0), (0.5, 0.025), (0.86, 0.16), (1, 0.36), (0.9, 0.58), (0.62, 0.76), (0.34, 0.9)]
     body = turned([*profile, (0.2, 1.0), (0, 1.0)], width_m, h, sides=120)
@@ -28,14 +31,14 @@ def garlic(*, width_m: float, tall: float, cloves: float, neck: float) -> Model:
         "roots", plate + union([root.translate((0.06 * r, 0, 0.003)).rotate((0, 0, 45 * k)) for k in range(8)]), "roots"
     )
     model.point("stem end", "tip", "stem", (0.12 * long, 0.0, h + long), (0.2, 0.0, 0.98))
-    turn = np.pi / 9  # the crest of a clove: an odd number of them goes round
+    turn = np.pi / 9  # the crest of a clove: the number of cloves is odd
     side = (r * float(np.cos(turn)), r * float(np.sin(turn)), 0.36 * h)
     return model.point("side", "surface", "body", side, (float(np.cos(turn)), float(np.sin(turn)), 0.0)).laid()
 
 
 @template("radish")
 def radish(*, length_m: float, width: float, root: float, tops_m: float) -> Model:
-    """Build a radish lying, its cut stalks towards +X; ``length_m`` is that without them, ``root`` its thin end's share."""
+    """Build a lying radish with cut stalks towards +X; ``length_m`` excludes them, ``root`` is the thin end's share."""
     wide, body_long = width * length_m, (1 - root) * length_m
     profile = [(0, 0.0), (0.3, 0.03), (0.7, 0.16), (0.97, 0.4), (1, 0.55), (0.88, 0.78), (0.55, 0.95), (0, 1.0)]
     body = lying(turned(profile, wide, body_long)).translate((0.5 * length_m - body_long, 0, 0))
@@ -62,7 +65,7 @@ def radish(*, length_m: float, width: float, root: float, tops_m: float) -> Mode
 
 
 def _round_root(width_m: float, tall: float, root: float, tops_m: float, parts: str) -> Model:
-    """Build a round root that lies on its side, its thin end of ``root`` of its height towards -X, cut stalks towards +X."""
+    """Build a round root lying on its side: the thin end, ``root`` of its height, to -X, and cut stalks to +X."""
     h = tall * width_m
     profile = [
         (0, 0.0),
@@ -101,19 +104,22 @@ def _round_root(width_m: float, tall: float, root: float, tops_m: float, parts: 
 
 @template("beetroot")
 def beetroot(*, width_m: float, tall: float, root: float, tops_m: float) -> Model:
-    """Build a beetroot lying on its side, its thin end towards -X, its cut stalks towards +X."""
+    """Build a beetroot lying on its side, with its thin end towards -X and its cut stalks towards +X."""
     return _round_root(width_m, tall, root, tops_m, "body")
 
 
 @template("turnip")
 def turnip(*, width_m: float, tall: float, root: float, tops_m: float) -> Model:
-    """Build a turnip lying on its side, its crown of another colour towards +X."""
+    """Build a turnip lying on its side, with its crown of another colour towards +X."""
     return _round_root(width_m, tall, root, tops_m, "crown")
 
 
 @template("sweet potato")
 def sweet_potato(*, length_m: float, width: float, bend: float, lumps: float) -> Model:
-    """Build a sweet potato lying, thin at both ends; ``bend`` is how far its middle is off their line, of the length."""
+    """Build a lying sweet potato, thin at both ends.
+
+    ``bend`` is the distance of its middle from the line through its ends, relative to the length.
+    """
     r, along = 0.5 * width * length_m, np.linspace(0, 1, 44)
     share, wide = (
         [0, 0.02, 0.08, 0.22, 0.42, 0.6, 0.8, 0.93, 0.985, 1],

@@ -1,4 +1,4 @@
-"""More tools with a handle, lying along X, their working end towards +X; and what stands about in a yard or a kitchen."""
+"""Further hand tools, lying along X with the working end towards +X, and items that stand in a yard or a kitchen."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("gavel")
 def gavel(*, length_m: float, head: float, thick: float, grip_m: float) -> Model:
-    """Build a gavel, its head across the end of its handle; ``head`` is its length's share, ``thick`` its width over that."""
+    """Build a gavel with its head across the end of its handle; ``head`` is its share, ``thick`` its width relative to that."""
     long, end = head * length_m, 0.5 * length_m
     r, at = 0.5 * thick * long, 0.5 * length_m - 0.5 * thick * long
     half = [
@@ -75,7 +75,7 @@ def file(*, length_m: float, blade: float, width_m: float, thick: float, grip_m:
 
 @template("awl")
 def awl(*, length_m: float, blade: float, spike_m: float, grip_m: float) -> Model:
-    """Build an awl: a spike in a bulbous handle; ``blade`` is the spike's share of the length."""
+    """Build an awl, a spike in a bulbous handle; ``blade`` is the spike's share of the length."""
     end, start = 0.5 * length_m, 0.5 * length_m - blade * length_m
     r, t = 0.5 * grip_m, 0.5 * spike_m
     bulb = [(0, -end), (0.6 * r, -end), (r, -end + 0.18 * (start + end)), (0.9 * r, -end + 0.45 * (start + end))]
@@ -102,7 +102,7 @@ def awl(*, length_m: float, blade: float, spike_m: float, grip_m: float) -> Mode
 
 @template("hacksaw")
 def hacksaw(*, length_m: float, height: float, handle: float, bar_m: float) -> Model:
-    """Build a hacksaw lying on its side, its teeth towards -Y; ``height`` and ``handle`` are shares of the length."""
+    """Build a hacksaw lying on its side with its teeth towards -Y; ``height`` and ``handle`` are relative to the length."""
     end, high, t = 0.5 * length_m, height * length_m, bar_m
     start = -end + handle * length_m
     low = -0.5 * high
@@ -165,7 +165,7 @@ def hacksaw(*, length_m: float, height: float, handle: float, bar_m: float) -> M
 
 
 def _bar(a: tuple[float, float], b: tuple[float, float], width_m: float) -> list[tuple[float, float]]:
-    """Return the corners of a bar of a width from one place to another."""
+    """Return the corners of a bar of a given width between two points."""
     along = np.subtract(b, a)
     off = 0.5 * width_m * np.array([-along[1], along[0]]) / np.linalg.norm(along)
     return [tuple(map(float, place)) for place in (a - off, b - off, b + off, a + off)]  # type: ignore[misc]
@@ -173,7 +173,7 @@ def _bar(a: tuple[float, float], b: tuple[float, float], width_m: float) -> list
 
 @template("socket wrench")
 def socket_wrench(*, length_m: float, head: float, thick: float, socket: float, grip: float) -> Model:
-    """Build a ratchet lying with its drive up; ``grip`` is its handle's share of the length, the others are over that."""
+    """Build a lying ratchet with its drive up; ``grip`` is the handle's share, and all ratios are relative to the length."""
     r, h, end = 0.5 * head * length_m, thick * length_m, 0.5 * length_m
     at = end - r
     body = rounded([(0, 0), (0.9 * r, 0), (r, 0.12 * h), (r, 0.88 * h), (0.9 * r, h), (0, h)], 0.08 * h)
@@ -205,7 +205,10 @@ _BANDS = ((0.4, 0.55), (0.68, 0.8))
 
 @template("traffic cone")
 def traffic_cone(*, height_m: float, foot: float, cone: float, top: float) -> Model:
-    """Build a hollow cone on a square foot, two bands on it; ``foot`` and ``cone`` are over the height, ``top`` over the cone."""
+    """Build a hollow cone with two bands on a square foot.
+
+    ``foot`` and ``cone`` are relative to the height, ``top`` to the cone.
+    """
     h, w, r = height_m, foot * height_m, 0.5 * cone * height_m
     wall = 0.01 * height_m + 0.0012
     plate = 0.05 * h
@@ -236,7 +239,7 @@ def traffic_cone(*, height_m: float, foot: float, cone: float, top: float) -> Mo
 
 @template("toy bucket")
 def toy_bucket(*, height_m: float, width: float, taper: float, wall_m: float) -> Model:
-    """Build a bucket of plastic for sand, its flat bow folded down to its rim; ``taper`` is its foot's width over its mouth's."""
+    """Build a plastic sand bucket with its flat bail folded down to its rim; ``taper`` is its foot's width over its mouth's."""
     h, r = height_m, 0.5 * width * height_m
     profile = rounded(
         [(taper * r, 0.0), (taper * r, 0.002), (0.97 * r, 0.92 * h), (1.04 * r, 0.93 * h), (1.04 * r, h)], 0.002
@@ -252,7 +255,7 @@ def toy_bucket(*, height_m: float, width: float, taper: float, wall_m: float) ->
 
 @template("fly swatter")
 def fly_swatter(*, length_m: float, head: float, wide: float, thick_m: float) -> Model:
-    """Build a fly swatter lying; ``head`` is its flap's share of the length, ``wide`` its width over that."""
+    """Build a lying fly swatter; ``head`` is its flap's share of the length, ``wide`` its width relative to that."""
     end, long = 0.5 * length_m, head * length_m
     w = wide * long
     flap = prism(rectangle(long, w, radius_m=0.16 * w), thick_m).translate((end - 0.5 * long, 0, -0.5 * thick_m))

@@ -1,4 +1,4 @@
-"""Small things to eat, and a pizza. Long ones lie along X, the end with the stem towards +X."""
+"""Small foods and a pizza. Long ones lie along X with the stem end towards +X."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("chili pepper")
 def chili_pepper(*, length_m: float, width: float, bend: float, stem_m: float) -> Model:
-    """Build a chili lying, its stem towards +X; ``bend`` is how far its tip is bent, of the length."""
+    """Build a lying chili with its stem towards +X.
+
+    ``bend`` is the displacement of its bent tip relative to the length.
+    """
     n, r = length_m, 0.5 * width * length_m
     along = np.linspace(0, 1, 40)
     half = r * np.interp(along, [0, 0.03, 0.2, 0.6, 0.9, 0.98, 1.0], [0.06, 0.16, 0.5, 0.9, 1.0, 0.8, 0.5])
@@ -41,7 +44,7 @@ def chili_pepper(*, length_m: float, width: float, bend: float, stem_m: float) -
 
 @template("grape")
 def grape(*, length_m: float, width: float, stem_m: float) -> Model:
-    """Build a grape lying, the rest of its stalk towards +X."""
+    """Build a lying grape with the rest of its stalk towards +X."""
     n, y = length_m, width * length_m
     model = Model().add("body", ellipsoid(n, y, y))
     end = 0.5 * n + stem_m
@@ -52,7 +55,7 @@ def grape(*, length_m: float, width: float, stem_m: float) -> Model:
 
 @template("blueberry")
 def blueberry(*, width_m: float, tall: float, crown: float) -> Model:
-    """Build a blueberry with its crown up; ``crown`` is its width over the berry's."""
+    """Build a blueberry with its crown on top; ``crown`` is its width relative to the berry's."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [
         (0, 0.0),
@@ -77,7 +80,7 @@ def blueberry(*, width_m: float, tall: float, crown: float) -> Model:
 
 @template("snack bar")
 def snack_bar(*, length_m: float, width: float, thick: float, crimp: float) -> Model:
-    """Build a bar in its wrapper, lying, with flat crimped ends of ``crimp`` of the length."""
+    """Build a lying bar in its wrapper; the flat crimped ends take ``crimp`` of the length."""
     n, y, t = length_m, width * length_m, thick * length_m
     inner = (1 - 2 * crimp) * n
     pillow = box(inner, 0.92 * y, t, radius_m=0.4 * t)
@@ -95,7 +98,10 @@ def snack_bar(*, length_m: float, width: float, thick: float, crimp: float) -> M
 
 @template("pizza")
 def pizza(*, width_m: float, thick: float, rim: float, slices: float) -> Model:
-    """Build a pizza lying: a raised ``rim``, a share of its radius, around a topping with round ``slices`` on it."""
+    """Build a lying pizza with a raised ``rim`` around a topping with nine round slices.
+
+    ``rim`` and the radius of a slice, ``slices``, are relative to the pizza's radius.
+    """
     r, t = 0.5 * width_m, thick * width_m
     side = [
         (0.0, 0.0),
@@ -123,7 +129,7 @@ def pizza(*, width_m: float, thick: float, rim: float, slices: float) -> Model:
 
 @template("burrito")
 def burrito(*, length_m: float, width: float, foil: float) -> Model:
-    """Build a wrap lying, its lower end towards -X in foil up to ``foil`` of the length."""
+    """Build a lying wrap whose lower end towards -X is in foil up to ``foil`` of the length."""
     n, r = length_m, 0.5 * width * length_m
     side = bulge([(0.86 * r, -0.5 * n), (0.98 * r, -0.25 * n), (r, 0.1 * n), (0.9 * r, 0.47 * n)])
     model = Model().add(

@@ -1,4 +1,4 @@
-"""Small goods for the body, a desk and a workshop. Long ones lie along X, the end that does the work towards +X."""
+"""Small items for the body, a desk and a workshop. Long ones lie along X with the working end towards +X."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from manitwin.models.generators.templates.template import Model, template
 @template("mascara")
 @template("eyeliner")
 def cosmetic_tube(*, length_m: float, width: float, cap: float, waist: float) -> Model:
-    """Build a closed round tube, its cap of ``cap`` of the length towards +X; ``waist`` is the cap's width over the barrel's."""
+    """Build a closed round tube with its cap towards +X.
+
+    ``cap`` is the cap's share of the length, ``waist`` its width relative to the barrel's.
+    """
     n, r = length_m, 0.5 * width * length_m
     joint = (0.5 - cap) * n
     barrel = rounded([(0, -0.5 * n), (0.9 * r, -0.5 * n), (r, -0.48 * n), (r, joint), (0, joint)], 0.2 * r)
@@ -30,7 +33,10 @@ def cosmetic_tube(*, length_m: float, width: float, cap: float, waist: float) ->
 
 @template("makeup brush")
 def makeup_brush(*, length_m: float, head: float, width: float, ferrule: float, handle: float) -> Model:
-    """Build a brush with a round head: ``head`` and ``ferrule`` its shares, ``handle`` its width over the head's."""
+    """Build a brush with a round head.
+
+    ``head`` and ``ferrule`` are shares of the length, ``handle`` is the handle's width relative to the head's.
+    """
     n, r = length_m, 0.5 * width * length_m
     tip, neck, end = 0.5 * n, (0.5 - head) * n, (0.5 - head - ferrule) * n
     thin = handle * r
@@ -67,7 +73,10 @@ def makeup_brush(*, length_m: float, head: float, width: float, ferrule: float, 
 @template("bandage roll")
 @template("medical tape")
 def rolled_strip(*, width_m: float, tall: float, core: float, loose: float) -> Model:
-    """Build a strip rolled up, standing: ``core`` is its hole over its width, ``loose`` its free end."""
+    """Build a standing rolled-up strip.
+
+    ``core`` is its hole relative to its width, ``loose`` how far the free end protrudes relative to the radius.
+    """
     r, h = 0.5 * width_m, tall * width_m
     model = Model().add("body", cylinder(r, h))
     step = max(0.0008, loose * r)
@@ -81,7 +90,7 @@ def rolled_strip(*, width_m: float, tall: float, core: float, loose: float) -> M
 
 @template("cigar")
 def cigar(*, length_m: float, width: float, band: float) -> Model:
-    """Build a cigar lying, its closed end with a paper band towards -X."""
+    """Build a lying cigar with its closed end and a paper band towards -X."""
     n, r = length_m, 0.5 * width * length_m
     curve = arc(
         [
@@ -103,7 +112,7 @@ def cigar(*, length_m: float, width: float, band: float) -> Model:
 
 @template("pocket knife")
 def pocket_knife(*, length_m: float, width: float, thick: float, bolster: float) -> Model:
-    """Build a closed folding knife that lies on its side, the blade's back along -Y, its pivot towards +X."""
+    """Build a closed folding knife lying on its side, with the blade's back along -Y and its pivot towards +X."""
     n, y, t = length_m, width * length_m, thick * length_m
     outline = rectangle(n, y, radius_m=0.48 * y)
     model = Model().add("body", prism(outline, t, radius_m=0.22 * t))
@@ -129,7 +138,7 @@ def pocket_knife(*, length_m: float, width: float, thick: float, bolster: float)
 
 @template("memory card")
 def memory_card(*, length_m: float, width: float, thick: float, corner: float) -> Model:
-    """Build a card with a cut corner and contacts below, its label up, the contacts' edge towards +X."""
+    """Build a card with a cut corner, its label up and its contacts below, near the edge towards +X."""
     n, y, t = length_m, width * length_m, thick * length_m
     cut = corner * y
     outline = [
@@ -151,7 +160,7 @@ def memory_card(*, length_m: float, width: float, thick: float, corner: float) -
 
 @template("id card")
 def id_card(*, length_m: float, width: float, thick_m: float, photo: float) -> Model:
-    """Build a plastic card with a portrait's field, lying on its back; ``photo`` is the field's width over the card's."""
+    """Build a plastic card with a portrait field, lying on its back; ``photo`` is the field's width relative to the card's."""
     n, y, t = length_m, width * length_m, thick_m
     model = Model().add("body", prism(rectangle(n, y, radius_m=0.003), t))
     field = prism(rectangle(photo * n, 1.25 * photo * n), 0.0001).translate((-0.32 * n, -0.02 * y, t - 0.00004))
@@ -164,9 +173,10 @@ def id_card(*, length_m: float, width: float, thick_m: float, photo: float) -> M
 
 @template("binder clip")
 def binder_clip(*, length_m: float, tall: float, deep: float, levers: float) -> Model:
-    """Build a clip that stands on its back, its jaws up and its two wire levers folded against its sides.
+    """Build a clip standing on its back, with its jaws up and its two wire levers folded against its sides.
 
-    ``length_m`` is the jaws'; ``tall`` and ``deep`` are its height and its back's width over it, ``levers`` how far they reach.
+    ``length_m`` is that of the jaws. ``tall`` and ``deep`` are its height and the width of its back relative to that, ``levers``
+    the reach of the levers.
     """
     n, h, y = length_m, tall * length_m, deep * length_m
     sheet = 0.01 * n + 0.0001
@@ -202,7 +212,7 @@ def binder_clip(*, length_m: float, tall: float, deep: float, levers: float) -> 
 
 @template("thumbtack")
 def push_pin(*, length_m: float, head: float, width: float) -> Model:
-    """Build a push pin that lies on its head's rims, its point towards +X; ``head`` is the grip's share of its length."""
+    """Build a push pin lying on the rims of its head with its point towards +X; ``head`` is the grip's share of its length."""
     n, r = length_m, 0.5 * width * length_m
     end = (head - 0.5) * n
     grip = [

@@ -1,4 +1,4 @@
-"""Small things to eat: sweets on sticks and in cones, butter, sushi, pretzels. Sticks and cones lie, their tip towards +X."""
+"""Snacks: sweets on sticks, ice cream cones, butter, sushi, pretzels. Sticks and cones lie with their tip towards +X."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("lollipop")
 def lollipop(*, width_m: float, thick: float, stick_m: float, stick_width_m: float) -> Model:
-    """Build a lollipop lying on its flat side with a spiral on it; ``stick_m`` of its stick are seen."""
+    """Build a lollipop with a spiral lying on its flat side; ``stick_m`` is the visible length of its stick."""
     r, h = 0.5 * width_m, thick * width_m
     disc = ellipsoid(width_m, width_m, 2 * h) ^ box(2 * width_m, 2 * width_m, h).translate((0, 0, -0.5 * h))
     model = Model().add("body", disc)
@@ -42,7 +42,10 @@ def lollipop(*, width_m: float, thick: float, stick_m: float, stick_width_m: flo
 
 @template("popsicle")
 def popsicle(*, length_m: float, width: float, thick: float, stick: float) -> Model:
-    """Build a popsicle lying, its stick towards +X; ``width`` and ``stick`` are over the length, ``thick`` over the width."""
+    """Build a lying popsicle with its stick towards +X.
+
+    ``width`` and ``stick`` are relative to the length, ``thick`` to the width.
+    """
     ice, wide = (1 - stick) * length_m, width * length_m
     h, low = thick * width * length_m, -0.5 * length_m
     turn = np.linspace(0.5 * np.pi, 1.5 * np.pi, 16)
@@ -64,9 +67,9 @@ def popsicle(*, length_m: float, width: float, thick: float, stick: float) -> Mo
 
 @template("ice cream cone")
 def ice_cream_cone(*, length_m: float, width: float, scoop: float, tip: float) -> Model:
-    """Build a cone with a scoop, lying on both, its tip towards +X; ``scoop`` is the scoop's width over the cone's mouth."""
+    """Build a cone with a scoop, lying on both, with its tip towards +X; ``scoop`` is its width over the cone's mouth."""
     mouth, ball = width * length_m, scoop * width * length_m
-    depth = 0.5 * float(np.sqrt(ball**2 - mouth**2))  # from the scoop's middle down to the mouth
+    depth = 0.5 * float(np.sqrt(ball**2 - mouth**2))  # from the scoop's centre down to the mouth
     long = length_m - 0.5 * ball - depth
     wall = lathe([(tip * mouth, 0.0), (0.5 * mouth, long), (0.54 * mouth, long + 0.006), (0.5 * mouth, long + 0.008)])
     ribs = [
@@ -91,7 +94,7 @@ def ice_cream_cone(*, length_m: float, width: float, scoop: float, tip: float) -
 
 @template("butter stick")
 def butter_stick(*, length_m: float, width: float, height: float) -> Model:
-    """Build a block of butter in its paper, the folds at its ends."""
+    """Build a block of butter in its paper, with folds at its ends."""
     w, h = width * length_m, height * length_m
     model = Model().add("body", box(length_m, w, h, radius_m=0.0025))
     for side in (-1.0, 1.0):
@@ -106,7 +109,7 @@ def butter_stick(*, length_m: float, width: float, height: float) -> Model:
 
 @template("sushi")
 def sushi(*, length_m: float, width: float, rice: float, fish: float) -> Model:
-    """Build a piece of nigiri: fish over rice, a band around both; ``rice`` and ``fish`` are heights over the width."""
+    """Build a piece of nigiri: fish over rice and a band around both; ``rice`` and ``fish`` are heights relative to the width."""
     w = width * length_m
     low, thick = rice * w, fish * w
     body = ellipsoid(0.92 * length_m, w, 2 * low) ^ box(2 * length_m, 2 * w, 0.86 * low)
@@ -134,7 +137,7 @@ def sushi(*, length_m: float, width: float, rice: float, fish: float) -> Model:
 
 @template("pretzel")
 def pretzel(*, width_m: float, thick: float, tall: float) -> Model:
-    """Build a pretzel lying, its crossed ends towards -Y; ``thick`` is its rope's width over its own."""
+    """Build a lying pretzel with its crossed ends towards -Y; ``thick`` is its strand's width relative to its own."""
     w, d, r = 0.5 * width_m, tall * width_m, 0.5 * thick * width_m
     x = w - r
     points = [(-0.4 * x, -0.36 * d), (-0.04 * x, -0.06 * d), (0.28 * x, 0.26 * d), (0.62 * x, 0.43 * d)]

@@ -1,4 +1,4 @@
-"""Sports: more balls, about their middle and then laid on the ground; rackets lie on their face, their head towards +X."""
+"""Sports equipment: further balls, built about the origin and then placed on the ground; rackets lie with the head to +X."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from manitwin.models.generators.templates.catalog.organic import lying
 from manitwin.models.generators.templates.template import Model, template
 
 STRINGS, STRING_M = (18, 16), 0.0014
-"""How many across and along a racket's head, and how thick they are."""
+"""Number of strings across and along a racket's head, and their thickness in metres."""
 
 
 def _seam(points: np.ndarray, radius_m: float, half_width_m: float) -> Manifold:
-    """Return a thin line through points ``(N, 3)``, moved onto a sphere."""
+    """Return a thin tube through points ``(N, 3)`` projected onto a sphere."""
     line = points * radius_m / np.linalg.norm(points, axis=1)[:, None]
     return tube(line, half_width_m, sides=6, across=tuple(line[0] / radius_m))
 
@@ -27,7 +27,7 @@ def _ring(radius_m: float, half_width_m: float) -> Manifold:
 
 @template("basketball")
 def basketball(*, width_m: float, seam: float, bow: float) -> Model:
-    """Build a basketball with its eight seams; ``bow`` is how far the bent ones reach, of the radius."""
+    """Build a basketball with its eight seams; ``bow`` is the reach of the curved ones relative to the radius."""
     r, half = 0.5 * width_m, 0.5 * seam * width_m
     model = Model().add("body", sphere(width_m, 64))
     t = np.linspace(-0.5 * np.pi, 1.5 * np.pi, 80, endpoint=False)
@@ -42,7 +42,7 @@ def basketball(*, width_m: float, seam: float, bow: float) -> Model:
 
 @template("volleyball")
 def volleyball(*, width_m: float, seam: float) -> Model:
-    """Build a volleyball: on each of six sides three strips, which lie across those of the sides beside it."""
+    """Build a volleyball with three strips on each of six sides, perpendicular to those of the adjacent sides."""
     r, half = 0.5 * width_m, 0.5 * seam * width_m
     along = np.linspace(-1.0, 1.0, 26)
     lines = [np.column_stack([np.ones(26), along, np.full(26, at)]) for at in (-1.0, -0.33, 0.33, 1.0)]
@@ -78,7 +78,7 @@ def softball(*, width_m: float, seam_m: float) -> Model:
 
 @template("cricket ball")
 def cricket_ball(*, width_m: float, seam_m: float) -> Model:
-    """Build a cricket ball, its seam of six rows around its middle, level."""
+    """Build a cricket ball with its seam of six rows around its horizontal great circle."""
     r = 0.5 * width_m
     model = Model().add("body", sphere(width_m, 64))
     rows = [
@@ -92,7 +92,7 @@ def cricket_ball(*, width_m: float, seam_m: float) -> Model:
 
 @template("bocce ball")
 def bocce_ball(*, width_m: float, rings: float, groove_m: float) -> Model:
-    """Build a ball with grooves that go round; ``rings`` is how many."""
+    """Build a ball with ``rings`` circular grooves."""
     r, count = 0.5 * width_m, round(rings)
     model = Model().add("body", sphere(width_m, 72))
     heights = (np.arange(count) - 0.5 * (count - 1)) * 0.16 * r
@@ -103,13 +103,13 @@ def bocce_ball(*, width_m: float, rings: float, groove_m: float) -> Model:
 
 @template("steel ball")
 def steel_ball(*, width_m: float) -> Model:
-    """Build a ball of a bearing."""
+    """Build a bearing ball."""
     return laid_ball(Model().add("body", sphere(width_m, 48)), width_m)
 
 
 @template("kettlebell")
 def kettlebell(*, height_m: float, body: float, grip_m: float, foot: float) -> Model:
-    """Build a kettlebell: a ball with a flat foot, a handle over it along X; ``body`` is the ball's height over the whole one."""
+    """Build a ball with a flat foot and a handle above it along X; ``body`` is the ball's share of the height."""
     ball = body * height_m
     r, t = 0.53 * ball, 0.5 * grip_m
     solid = ellipsoid(2 * r, 2 * r, 2 * r).translate((0, 0, ball - r)) ^ box(4 * r, 4 * r, 2 * ball)
@@ -137,10 +137,10 @@ def kettlebell(*, height_m: float, body: float, grip_m: float, foot: float) -> M
 def _racket(
     length_m: float, head: float, oval: float, frame_m: float, shaft_m: float, grip_m: float, grip: float, throat: bool
 ) -> Model:
-    """Build a racket lying on its face, its head towards +X.
+    """Build a racket lying on its face with its head towards +X.
 
-    ``head`` is the head's length over the whole one, ``oval`` its width over its length, ``grip`` the handle's share; a
-    ``throat`` is open between two arms.
+    ``head`` is the head's share of the length, ``oval`` the head's width relative to its length, ``grip`` the handle's share.
+    With ``throat`` the shaft is open between two arms.
     """
     long, half_y = head * length_m, 0.5 * oval * head * length_m
     half_x, cx = 0.5 * long, 0.5 * length_m - 0.5 * long
@@ -183,7 +183,7 @@ def _racket(
 
 
 def _between_strings(half_x_m: float, half_y_m: float) -> Manifold:
-    """Return pins through an oval of these half axes, between strings that run along it and across it."""
+    """Return pins through an ellipse of these half axes that leave strings along and across it."""
     x, y = half_x_m / STRINGS[0], half_y_m / STRINGS[1]
     pin = box(2 * x - STRING_M, 2 * y - STRING_M, 0.02).translate((0, 0, -0.01))
     places = [
@@ -209,7 +209,10 @@ def badminton_racket(*, length_m: float, head: float, oval: float, frame_m: floa
 
 @template("drum stick")
 def drum_stick(*, length_m: float, width_m: float, taper: float, bead: float) -> Model:
-    """Build a drum stick lying, its bead towards +X; ``taper`` is its neck's width over its own, ``bead`` the bead's."""
+    """Build a lying drum stick with its tip towards +X.
+
+    ``taper`` is its neck's width relative to its own, ``bead`` that of the tip.
+    """
     r, end = 0.5 * width_m, 0.5 * length_m
     profile = [
         (0.8 * r, -end),
@@ -228,13 +231,13 @@ def drum_stick(*, length_m: float, width_m: float, taper: float, bead: float) ->
 
 @template("maraca")
 def maraca(*, length_m: float, head: float, width: float, grip_m: float) -> Model:
-    """Build a maraca lying, its head towards +X; ``head`` is that one's share of the length, ``width`` its width over that."""
+    """Build a lying maraca with its head to +X; ``head`` is the head's share of the length, ``width`` its width over that."""
     long = head * length_m
     r, t, ball = 0.5 * width * long, 0.5 * grip_m, length_m - 0.5 * head * length_m  # along it, from its end
     tilt = float(np.arcsin((r - 1.25 * t) / ball))
 
     def laid(solid: Manifold) -> Manifold:
-        """Turn what is about Z, the head's middle in the origin, to where its head and its end touch the ground."""
+        """Move a solid about Z, with the head's centre at the origin, to rest on its head and the end of its handle."""
         return lying(solid.translate((0, 0, -ball))).rotate((0, float(np.degrees(-tilt)), 0))
 
     stick = [(0, 0.0), (1.15 * t, 0.0), (1.25 * t, 0.008), (0.85 * t, 0.03), (t, 0.4 * (length_m - long))]

@@ -1,4 +1,4 @@
-"""Things of paper and for paper: to write on, to keep, to fix, to stamp and to look at."""
+"""Paper goods and office items to write on, store, fix, stamp and look at."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from manitwin.models.generators.templates.template import Model, template
 
 
 def _lying(profile: list[Point], sides: int = 36) -> Manifold:
-    """Return a turned solid whose axis lies along X."""
+    """Return a solid of revolution whose axis lies along X."""
     return lathe(profile, sides=sides).rotate((0, 90, 0))
 
 
 @template("crayon")
 def crayon(*, length_m: float, width: float, sleeve: float) -> Model:
-    """Build a wax crayon in its paper sleeve, the tip towards +X."""
+    """Build a wax crayon in its paper sleeve, with the tip towards +X."""
     end, r = 0.5 * length_m, 0.5 * width * length_m
     tip = end - 2.2 * r
     body = [(0, -end), (r, -end), (r, tip), (0.8 * r, tip + 0.0005), (0.34 * r, end), (0, end)]
@@ -44,7 +44,7 @@ def crayon(*, length_m: float, width: float, sleeve: float) -> Model:
 
 @template("paper clip")
 def paper_clip(*, length_m: float, width: float, wire_m: float) -> Model:
-    """Build a clip of bent wire that lies, its outer loop towards +X."""
+    """Build a lying clip of bent wire with its outer loop towards +X."""
     end, half = 0.5 * length_m, 0.5 * width * length_m
     inner = 0.66 * half
 
@@ -73,7 +73,7 @@ def _wire(path: np.ndarray, end: float, wire_m: float) -> Model:
 
 @template("sticky notes")
 def sticky_notes(*, length_m: float, width: float, thick_m: float, curl: float) -> Model:
-    """Build a pad of notes that lies, its upper sheets curling up towards -Y."""
+    """Build a lying pad of notes whose upper sheets curl up towards -Y."""
     across = width * length_m
     model = Model().add("pad", box(length_m, across, thick_m))
     share = np.linspace(0, 1, 16)
@@ -90,7 +90,7 @@ def sticky_notes(*, length_m: float, width: float, thick_m: float, curl: float) 
 
 @template("envelope")
 def envelope(*, length_m: float, width: float, thick_m: float, flap: float) -> Model:
-    """Build a closed envelope with a letter in it that lies, its flap up, which opens from -Y."""
+    """Build a closed lying envelope containing a letter, with its flap up and opening from -Y."""
     across = width * length_m
     model = Model().add("body", prism(rectangle(length_m, across, radius_m=0.002), thick_m))
     reach, half = flap * across, 0.5 * length_m
@@ -107,7 +107,7 @@ def envelope(*, length_m: float, width: float, thick_m: float, flap: float) -> M
 
 @template("folder")
 def folder(*, length_m: float, width: float, thick_m: float, tab: float, reach: float) -> Model:
-    """Build a folder that lies closed, papers between its covers: the fold towards -X, a tab or none towards +X."""
+    """Build a closed lying folder with papers in it, the fold towards -X and a tab or none towards +X."""
     across, cover = width * length_m, 0.0012
     model = Model().add(
         "papers",
@@ -130,7 +130,7 @@ def folder(*, length_m: float, width: float, thick_m: float, tab: float, reach: 
 
 @template("hole punch")
 def hole_punch(*, length_m: float, depth: float, height: float) -> Model:
-    """Build a punch for two holes: its slot towards -Y, its lever above."""
+    """Build a punch for two holes with its slot towards -Y and its lever on top."""
     deep, high = depth * length_m, height * length_m
     foot, bed = 0.16 * high, 0.3 * high
     model = Model().add("base", prism(rectangle(length_m, deep, radius_m=0.01), foot, radius_m=0.003), "base")
@@ -162,7 +162,7 @@ def hole_punch(*, length_m: float, depth: float, height: float) -> Model:
 
 @template("stamp")
 def stamp(*, height_m: float, length: float, width: float, block: float) -> Model:
-    """Build a rubber stamp that stands on its rubber: a block with a turned handle."""
+    """Build a rubber stamp standing on its rubber: a block with a turned handle."""
     x, h = length * height_m, height_m
     y, thick = width * x, block * height_m
     model = Model().add("block", box(x, y, thick, radius_m=0.0015).translate((0, 0, 0.0035)))
@@ -188,11 +188,11 @@ _LAND = (
     (-18, 24, 24, 32), (48, 18, 40, 22), (58, 70, 80, 34), (35, 95, 60, 34), (18, 78, 16, 26), (-25, 134, 34, 24),
     (-84, 0, 40, 40),
 )  # fmt: skip
-"""Latitude and longitude of patches of land and how far they reach to the east and the north, in degrees."""
+"""Patches of land: latitude and longitude, and extents to the east and the north, in degrees."""
 
 
 def _land(radius_m: float) -> Manifold:
-    """Return land as patches that stand a little out of a sphere, its axis leaning by 23.5 degrees."""
+    """Return land as patches raised slightly above a sphere whose axis is tilted by 23.5 degrees."""
     patches = []
     for north, east, wide, high in _LAND:
         half_y, half_z = (
@@ -206,7 +206,7 @@ def _land(radius_m: float) -> Manifold:
 
 @template("globe")
 def globe(*, height_m: float, ball: float, base: float) -> Model:
-    """Build a globe in its bow, its axis leaning towards +X, on a round foot."""
+    """Build a globe in its bow on a round foot, with its axis tilted towards +X."""
     h, r = height_m, 0.5 * ball * height_m
     foot, middle = 0.5 * base * height_m, height_m - 0.5 * ball * height_m - 0.035 * height_m
     model = Model().add(
@@ -235,7 +235,7 @@ def globe(*, height_m: float, ball: float, base: float) -> Model:
 
 @template("paperweight")
 def paperweight(*, width_m: float, height: float, foot: float) -> Model:
-    """Build a dome of glass on a flat underside."""
+    """Build a glass dome with a flat underside."""
     r, high = 0.5 * width_m, height * width_m
     turn = np.linspace(-0.45, 0.5 * np.pi, 24)
     low = float(np.sin(-0.45))
@@ -248,7 +248,7 @@ def paperweight(*, width_m: float, height: float, foot: float) -> Model:
 
 @template("whiteboard eraser")
 def whiteboard_eraser(*, length_m: float, width: float, height: float, felt: float) -> Model:
-    """Build an eraser that lies on its felt, its grip up."""
+    """Build an eraser lying on its felt with its grip up."""
     across, high = width * length_m, height * length_m
     soft = felt * high
     model = Model().add("felt", box(0.97 * length_m, 0.94 * across, soft + 0.002), "felt")
@@ -274,7 +274,7 @@ def whiteboard_eraser(*, length_m: float, width: float, height: float, felt: flo
 
 @template("clipboard")
 def clipboard(*, length_m: float, width: float, thick_m: float, clip: float) -> Model:
-    """Build a board that lies, its clip towards +X; ``width`` and ``clip``, how broad the clip is, over the length."""
+    """Build a lying board with its clip towards +X; ``width`` and the clip's width ``clip`` are relative to the length."""
     across, broad = width * length_m, clip * length_m
     model = Model().add("board", prism(rectangle(length_m, across, radius_m=0.012), thick_m))
     place = 0.5 * length_m - 0.032

@@ -1,4 +1,4 @@
-"""What stands on a laid table besides dishes: for sugar, milk, sauce, butter, napkins and toothpicks. A spout is towards -X."""
+"""Tableware besides dishes: for sugar, milk, sauce, butter, napkins and toothpicks. Spouts point to -X."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("sugar bowl")
 def sugar_bowl(*, height_m: float, width: float, foot: float, mouth: float, wall_m: float) -> Model:
-    """Build a bowl without its lid, two ears along X; ``foot`` and ``mouth`` are widths over its belly's."""
+    """Build a bowl without its lid, with two handles along X; ``foot`` and ``mouth`` are widths relative to its belly's."""
     h, r, model = height_m, 0.5 * width * height_m, Model()
     side = [(0.92 * r, 0.22 * h), (r, 0.5 * h), (0.5 * (1.02 + mouth) * r, 0.82 * h), (mouth * r, h)]
     thick, ears = 0.06 * r + 0.0016, []
@@ -29,7 +29,7 @@ def sugar_bowl(*, height_m: float, width: float, foot: float, mouth: float, wall
 def _poured(
     outer_profile: list[tuple[float, float]], wall_m: float, floor_m: float, *, long: float, lip: float, handle: float
 ) -> Model:
-    """Build an oval jug: a body of a profile, ``long`` times as long as wide, pulled out to a lip, an ear behind it."""
+    """Build an oval jug: a body of the given profile, ``long`` times as long as wide, with a lip and a handle opposite."""
     model, h = Model(), outer_profile[-1][1]
     r = max(radius for radius, _ in outer_profile)
     outer, inner = shell(outer_profile, wall_m, floor_m)
@@ -76,7 +76,7 @@ def _poured(
 
 @template("milk pourer")
 def milk_pourer(*, height_m: float, width: float, lip: float, handle: float, wall_m: float) -> Model:
-    """Build a small jug for milk; ``lip`` and ``handle`` are how far they reach out over half its width."""
+    """Build a small milk jug; ``lip`` and ``handle`` are how far they protrude relative to half its width."""
     h, r = height_m, 0.5 * width * height_m
     profile = bulge([(0.7 * r, 0.0), (0.97 * r, 0.16 * h), (r, 0.36 * h), (0.78 * r, 0.72 * h), (0.8 * r, h)])
     return _poured(profile, wall_m, 1.5 * wall_m, long=1.0, lip=lip, handle=handle)
@@ -84,7 +84,10 @@ def milk_pourer(*, height_m: float, width: float, lip: float, handle: float, wal
 
 @template("gravy boat")
 def gravy_boat(*, height_m: float, width: float, long: float, lip: float, handle: float, wall_m: float) -> Model:
-    """Build a boat for sauce; ``long`` is its length over its width, ``lip`` and ``handle`` reach out over half of that."""
+    """Build a sauce boat; ``long`` is its length relative to its width.
+
+    ``lip`` and ``handle`` are how far they protrude relative to half the width.
+    """
     h, r = height_m, 0.5 * width * height_m
     profile = bulge([(0.5 * r, 0.0), (0.46 * r, 0.1 * h), (0.84 * r, 0.36 * h), (0.97 * r, 0.68 * h), (r, h)])
     return _poured(profile, wall_m, 0.14 * h, long=long, lip=lip, handle=handle)  # solid up to its waist
@@ -92,7 +95,7 @@ def gravy_boat(*, height_m: float, width: float, long: float, lip: float, handle
 
 @template("butter dish")
 def butter_dish(*, length_m: float, width: float, height: float, wall_m: float) -> Model:
-    """Build an oblong dish with its cover on, full, and a knob on that; ``width`` and ``height`` are shares of the length."""
+    """Build a filled oblong dish with its cover and a knob; ``width`` and ``height`` are shares of the length."""
     w, h = width * length_m, height * length_m
     plate = prism(rectangle(length_m, w, radius_m=0.16 * w), 0.2 * h, radius_m=0.045 * h)
     well = prism(rectangle(length_m - 6 * wall_m, w - 6 * wall_m, radius_m=0.1 * w), h).translate((0, 0, 0.11 * h))
@@ -117,7 +120,7 @@ def butter_dish(*, length_m: float, width: float, height: float, wall_m: float) 
 
 @template("napkin holder")
 def napkin_holder(*, length_m: float, height: float, gap: float, wall_m: float) -> Model:
-    """Build two upright walls on a floor, their upper corners round; ``height`` and ``gap`` are shares of the length."""
+    """Build two upright walls with rounded upper corners on a floor; ``height`` and ``gap`` are relative to the length."""
     h, deep = height * length_m, gap * length_m
     model = Model().add("base", box(length_m, deep + 2 * wall_m, wall_m, radius_m=0.3 * wall_m))
     turn = np.linspace(0.0, np.pi, 25)
@@ -135,7 +138,7 @@ def napkin_holder(*, length_m: float, height: float, gap: float, wall_m: float) 
 
 @template("utensil holder")
 def utensil_holder(*, height_m: float, width: float, taper: float, wall_m: float) -> Model:
-    """Build a crock for kitchen tools with two bands; ``taper`` is its foot's width over its mouth's."""
+    """Build a crock for kitchen tools with two bands; ``taper`` is its foot's width relative to its mouth's."""
     h, r = height_m, 0.5 * width * height_m
     profile = rounded([(0.96 * taper * r, 0.0), (taper * r, 0.006), (r, h)], 0.005)
     model = Model()
@@ -156,7 +159,7 @@ def utensil_holder(*, height_m: float, width: float, taper: float, wall_m: float
 
 @template("toothpick holder")
 def toothpick_holder(*, height_m: float, width: float, cap: float, holes: float) -> Model:
-    """Build a small barrel with holes in its cap; ``cap`` is that one's share of the height."""
+    """Build a small barrel with holes in its cap; ``cap`` is the cap's share of the height."""
     h, r, low = height_m, 0.5 * width * height_m, (1 - cap) * height_m
     body = rounded([(0, 0), (0.94 * r, 0), (r, 0.03 * h), (0.96 * r, low), (0, low)], 0.003)
     model = Model().add("body", lathe(body))

@@ -1,4 +1,4 @@
-"""Personal care and things that people wear or carry."""
+"""Personal care items and accessories."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("toothbrush")
 def toothbrush(*, length_m: float, head: float, thick_m: float) -> Model:
-    """Build a toothbrush lying with its bristles up; the head towards +X."""
+    """Build a lying toothbrush with its bristles up and its head towards +X."""
     end, long = 0.5 * length_m, head * length_m
     x = np.linspace(-end, end, 40)
     half = np.interp(
@@ -37,7 +37,7 @@ def soap(*, length_m: float, width: float, thick: float) -> Model:
 
 @template("comb")
 def comb(*, length_m: float, width_m: float, thick_m: float, spine: float) -> Model:
-    """Build a comb whose teeth point towards -Y."""
+    """Build a comb whose teeth point to -Y."""
     body = prism(rectangle(length_m, width_m, radius_m=0.006), thick_m)
     count = int(0.9 * length_m / 0.004)
     for number in range(count):
@@ -58,7 +58,7 @@ def comb(*, length_m: float, width_m: float, thick_m: float, spine: float) -> Mo
 
 @template("hairbrush")
 def hairbrush(*, length_m: float, head: float, width_m: float) -> Model:
-    """Build a paddle brush lying with its bristles up."""
+    """Build a lying paddle brush with its bristles up."""
     long, end = head * length_m, 0.5 * length_m
     at = end - 0.5 * long
     paddle = cylinder(0.5, 0.014).scale((long, width_m, 1)).translate((at, 0, 0))
@@ -79,7 +79,7 @@ def hairbrush(*, length_m: float, head: float, width_m: float) -> Model:
 
 @template("razor")
 def razor(*, length_m: float, head_m: float, thick_m: float) -> Model:
-    """Build a razor lying with its blades up; the head towards +X."""
+    """Build a lying razor with its blades up and its head towards +X."""
     end = 0.5 * length_m
     path = arc([(-end, 0, 0), (0, 0, 0.003), (end - 0.03, 0, 0.0), (end - 0.008, 0, -0.002)])
     half = np.interp(
@@ -97,7 +97,7 @@ def razor(*, length_m: float, head_m: float, thick_m: float) -> Model:
 
 @template("tissue box")
 def tissue_box(*, length_m: float, width: float, height_m: float) -> Model:
-    """Build a box with a slot, a tissue standing out of it."""
+    """Build a box with a slot from which a tissue protrudes."""
     across = width * length_m
     model = Model().add("body", box(length_m, across, height_m, radius_m=0.001))
     sheet = polygon(
@@ -115,7 +115,7 @@ def tissue_box(*, length_m: float, width: float, height_m: float) -> Model:
 
 @template("hand mirror")
 def hand_mirror(*, length_m: float, glass: float, thick_m: float) -> Model:
-    """Build a mirror lying with its glass up; the handle towards -X."""
+    """Build a lying mirror with its glass up and its handle towards -X."""
     radius = 0.5 * glass * length_m
     at = 0.5 * length_m - radius
     x = np.linspace(at - 0.9 * radius, -0.5 * length_m, 20)
@@ -130,7 +130,7 @@ def hand_mirror(*, length_m: float, glass: float, thick_m: float) -> Model:
 
 @template("toothpaste")
 def toothpaste(*, length_m: float, width_m: float, cap_m: float) -> Model:
-    """Build a tube that is flat at its end towards -X, its cap towards +X."""
+    """Build a tube with its flat end towards -X and its cap towards +X."""
     x = np.linspace(-0.5 * length_m, 0.5 * length_m - cap_m, 24)
     share = np.linspace(0, 1, 24)
     round_m = 0.36 * width_m
@@ -157,7 +157,7 @@ def toothpaste(*, length_m: float, width_m: float, cap_m: float) -> Model:
 
 @template("ring")
 def ring(*, width_m: float, thick_m: float, stone_m: float) -> Model:
-    """Build a ring with a stone, lying flat, the stone towards +X."""
+    """Build a lying ring with a stone towards +X."""
     model = Model().add("band", torus(0.5 * (width_m - thick_m), 0.5 * thick_m))
     gem = cylinder(0.5 * stone_m, 0.4 * stone_m, top_radius_m=0.35 * stone_m, sides=8).rotate((0, 90, 0))
     model.add("stone", gem.translate((0.5 * width_m - 0.3 * thick_m, 0, 0)), "stone")
@@ -169,7 +169,7 @@ def ring(*, width_m: float, thick_m: float, stone_m: float) -> Model:
 
 @template("bracelet")
 def bracelet(*, width_m: float, thick_m: float, broad: float) -> Model:
-    """Build a closed bangle lying flat; ``broad`` is its breadth over its thickness."""
+    """Build a lying closed bangle; ``broad`` is its breadth relative to its thickness."""
     band = torus(0.5 * (width_m - thick_m), 0.5 * thick_m).scale((1, 1, broad))
     model = Model().add("band", band)
     return model.point("hole", "hole", "band", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)).laid()
@@ -177,7 +177,7 @@ def bracelet(*, width_m: float, thick_m: float, broad: float) -> Model:
 
 @template("dental floss")
 def dental_floss(*, length_m: float, width: float, thick: float) -> Model:
-    """Build a box of floss lying on its side, the lid towards +X."""
+    """Build a box of floss lying on its side with its lid towards +X."""
     across, high = width * length_m, thick * length_m
     body = prism(rectangle(length_m, across, radius_m=0.3 * across), high, radius_m=0.003)
     model = Model().add("body", body).region("lid", "body", lambda centers: centers[:, 0] > 0.25 * length_m, "lid")
@@ -186,7 +186,7 @@ def dental_floss(*, length_m: float, width: float, thick: float) -> Model:
 
 @template("umbrella")
 def umbrella(*, length_m: float, width_m: float, grip: float) -> Model:
-    """Build a folded pocket umbrella lying along X, the grip towards -X."""
+    """Build a folded pocket umbrella lying along X with its grip towards -X."""
     end, r = 0.5 * length_m, 0.5 * width_m
     start = -end + grip * length_m
     cover = lathe(
@@ -217,9 +217,9 @@ def umbrella(*, length_m: float, width_m: float, grip: float) -> Model:
 
 @template("nail clipper")
 def nail_clipper(*, length_m: float, width: float, thick_m: float, lever: float) -> Model:
-    """Build a closed nail clipper lying on its lower bar, its jaws towards +X, the lever folded down towards -X.
+    """Build a closed nail clipper lying on its lower bar, with its jaws to +X and the folded lever to -X.
 
-    ``lever`` is the lever's length over the whole.
+    ``lever`` is the lever's length relative to the whole.
     """
     n, end, y = length_m, 0.5 * length_m, width * length_m
     gap = 0.0031

@@ -1,4 +1,4 @@
-"""Toy vehicles, which stand with their front towards -Y."""
+"""Toy vehicles, standing with their front towards -Y."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from manitwin.models.generators.templates.template import Model, template
 
 
 def slab_across(side: list[Point], width_m: float, radius_m: float) -> Manifold:
-    """Return an outline (y, z) as thick along X as a width, centred."""
+    """Return an outline (y, z) extruded along X to a width, centred."""
     slab = prism(polygon(side, radius_m=radius_m), width_m, radius_m=radius_m)
     return slab.translate((0, 0, -0.5 * width_m)).rotate((90, 0, 90))
 
 
 def _wheel(radius_m: float, thick_m: float, x_m: float, y_m: float) -> Manifold:
-    """Return a wheel on the ground whose outer face is at ``x_m``, towards the side that it has."""
+    """Return a wheel on the ground whose outer face is at ``x_m``."""
     turned = cylinder(radius_m, thick_m, sides=chords(40)) + cylinder(0.4 * radius_m, 1.12 * thick_m, sides=chords(24))
     return turned.translate((0, 0, -thick_m)).rotate((0, 90 if x_m > 0 else -90, 0)).translate((x_m, y_m, radius_m))
 
 
 @template("toy truck")
 def toy_truck(*, length_m: float, width: float, height: float, cab: float, wheel: float) -> Model:
-    """Build a lorry with an open tray behind its cab: ``cab`` is its share of the length, ``wheel`` a wheel's width over it."""
+    """Build a truck with an open bed behind its cab; ``cab`` and the wheel's diameter ``wheel`` are relative to the length."""
     n, x, h = length_m, width * length_m, height * length_m
     r, front = 0.5 * wheel * length_m, (cab - 0.5) * length_m
     floor = 1.25 * r
@@ -72,7 +72,7 @@ def toy_truck(*, length_m: float, width: float, height: float, cab: float, wheel
 
 @template("toy train")
 def toy_train(*, length_m: float, width: float, height: float, boiler: float, wheel: float) -> Model:
-    """Build a steam engine: a boiler with a chimney before a cab; ``boiler`` is its share, ``wheel`` as of a truck."""
+    """Build a steam engine: a boiler with a chimney in front of a cab; ``boiler`` is its share, ``wheel`` as for a truck."""
     n, x, h = length_m, width * length_m, height * length_m
     r, back = 0.5 * wheel * length_m, (boiler - 0.5) * length_m
     floor = 1.2 * r
@@ -103,7 +103,10 @@ def toy_train(*, length_m: float, width: float, height: float, boiler: float, wh
 
 @template("toy boat")
 def toy_boat(*, length_m: float, width: float, height: float, hull: float, cabin: float) -> Model:
-    """Build a boat, its bow towards -Y: ``hull`` is the deck's height over it, ``cabin`` the cabin's length over the boat's."""
+    """Build a boat with its bow towards -Y.
+
+    ``hull`` is the deck's height relative to the boat's, ``cabin`` the cabin's length relative to the boat's.
+    """
     n, x, h = length_m, 0.5 * width * length_m, height * length_m
     deck = hull * h
     bow = arc([(0, -0.5 * n, 0), (0.62 * x, -0.3 * n, 0), (x, 0.0, 0), (0.94 * x, 0.42 * n, 0), (0.86 * x, 0.5 * n, 0)])
@@ -123,7 +126,10 @@ def toy_boat(*, length_m: float, width: float, height: float, hull: float, cabin
 
 @template("toy airplane")
 def toy_airplane(*, length_m: float, span: float, chord: float, body: float, tail: float) -> Model:
-    """Build an aeroplane on three wheels, its nose towards -Y: ``span`` and ``tail`` are of its wings, ``chord`` their depth."""
+    """Build an aeroplane on three wheels with its nose to -Y; ``span`` and ``tail`` are the spans of its wings.
+
+    ``chord`` is the depth of the wings.
+    """
     n, r = length_m, 0.5 * body * length_m
     low = 0.9 * r
     profile = [

@@ -1,4 +1,4 @@
-"""Blocks, game pieces, discs and toys: what stands looks towards -Y."""
+"""Blocks, game pieces, discs and toys; standing ones face -Y."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("hockey puck")
 def hockey_puck(*, width_m: float, thick: float) -> Model:
-    """Build a puck lying flat, its edge ribbed."""
+    """Build a lying puck with a ribbed edge."""
     r, h = 0.5 * width_m, thick * width_m
     model = Model().add("body", lathe(rounded([(0, 0), (r, 0), (r, h), (0, h)], 0.002), sides=chords(72)))
     grooves = [torus(r + 0.0004, 0.0008).translate((0, 0, share * h)) for share in (0.3, 0.5, 0.7)]
@@ -41,7 +41,7 @@ def hockey_puck(*, width_m: float, thick: float) -> Model:
 
 @template("frisbee")
 def frisbee(*, width_m: float, high: float, wall_m: float) -> Model:
-    """Build a flying disc lying on its rim, its hollow down."""
+    """Build a flying disc lying on its rim, with its hollow side down."""
     r, h, edge = 0.5 * width_m, high * width_m, 0.012 * width_m
     outer = [(0, h), (0.72 * r, h), (0.9 * r, 0.92 * h), (r, 0.4 * h), (0.985 * r, 0), (0.985 * r - edge, 0)]
     under = [
@@ -63,7 +63,7 @@ def frisbee(*, width_m: float, high: float, wall_m: float) -> Model:
 
 @template("stacking ring")
 def stacking_ring(*, width_m: float, hole: float) -> Model:
-    """Build a ring lying flat; ``hole`` is the hole's width over the ring's."""
+    """Build a lying ring; ``hole`` is the hole's width relative to the ring's."""
     ring, half = ring_radii(width_m, hole)
     model = Model().add("body", torus(ring, half, sides=chords(64)))
     return with_both_sides(model, width_m, hole, hole_share=0.7)
@@ -71,7 +71,7 @@ def stacking_ring(*, width_m: float, hole: float) -> Model:
 
 @template("yo yo")
 def yo_yo(*, width_m: float, thick: float, gap: float) -> Model:
-    """Build a yo-yo lying on one of its halves, its string wound up; ``gap`` is the slot's height over the whole one."""
+    """Build a yo-yo lying on one half with its string wound up; ``gap`` is the slot's height relative to the whole."""
     r, h = 0.5 * width_m, thick * width_m
     low, slot = 0.5 * (1 - gap) * h, gap * h
     half = [(0, 0.04 * h), (0.5 * r, 0.03 * h), (0.72 * r, 0.0), (r, 0.55 * low), (0.9 * r, low), (0, low)]
@@ -88,7 +88,7 @@ def yo_yo(*, width_m: float, thick: float, gap: float) -> Model:
 
 @template("rubik's cube")
 def rubiks_cube(*, width_m: float, sticker: float, gap_m: float) -> Model:
-    """Build a solved cube, green to the front and white up; ``sticker`` is a sticker's width over its piece's."""
+    """Build a solved cube, green in front and white on top; ``sticker`` is a sticker's width relative to its piece's."""
     half, piece = 0.5 * width_m, width_m / 3
     raised = 0.0004
     model = Model().add("body", box(width_m, width_m, width_m, radius_m=0.0015).translate((0, 0, -half)))
@@ -114,7 +114,7 @@ def rubiks_cube(*, width_m: float, sticker: float, gap_m: float) -> Model:
 
 @template("domino")
 def domino(*, length_m: float, width: float, thick: float, spot: float) -> Model:
-    """Build a domino lying face up, six and four; ``spot`` is a spot's width over the domino's."""
+    """Build a lying domino with six and four facing up; ``spot`` is a spot's width relative to the domino's."""
     y, h = width * length_m, thick * length_m
     model = Model().add("body", box(length_m, y, h, radius_m=0.0015))
     r = 0.5 * spot * y
@@ -132,7 +132,7 @@ def domino(*, length_m: float, width: float, thick: float, spot: float) -> Model
 
 @template("chess piece")
 def chess_piece(*, height_m: float, width: float, head: float, waist: float) -> Model:
-    """Build a pawn; ``head`` and ``waist`` are over its foot's width."""
+    """Build a pawn; ``head`` and ``waist`` are relative to its foot's width."""
     h, r = height_m, 0.5 * width * height_m
     ball, thin = head * r, waist * r
     foot = [(0, 0), (r, 0), (r, 0.09 * h), (0.86 * r, 0.14 * h), (0.9 * r, 0.18 * h), (0.62 * r, 0.25 * h)]
@@ -155,7 +155,7 @@ def chess_piece(*, height_m: float, width: float, head: float, waist: float) -> 
 
 @template("toy car")
 def toy_car(*, length_m: float, width: float, height: float, cabin: float, wheel: float) -> Model:
-    """Build a car, its front towards -Y; ``cabin`` is the cabin's share of the length, ``wheel`` a wheel's width over it."""
+    """Build a car with its front to -Y; the cabin's length and the wheel's diameter are relative to the car's length."""
     n, x, h = length_m, 0.5 * width * length_m, height * length_m
     r = 0.5 * wheel * n
     low, belt = 0.55 * r, 0.56 * h
@@ -210,11 +210,11 @@ def toy_car(*, length_m: float, width: float, height: float, cabin: float, wheel
 
 @template("bowling pin")
 def bowling_pin(*, height_m: float, width: float, neck: float, head: float) -> Model:
-    """Build a pin with a belly, a ``neck`` and a round ``head``, both over the belly's width."""
+    """Build a pin with a belly, a ``neck`` and a round ``head``, both relative to the belly's width."""
     h, r = height_m, 0.5 * width * height_m
     side = [(0.47 * r, 0.0), (0.86 * r, 0.15 * h), (r, 0.3 * h), (0.76 * r, 0.5 * h), (neck * r, 0.68 * h)]
     crown = np.linspace(0.0, 0.5 * np.pi, 6)
-    ball = 1.0 - head * r / h  # where the head is broadest, its upper half round
+    ball = 1.0 - head * r / h  # where the head is widest, with a round upper half
     profile = bulge([*side, (head * r, ball * h)], rows=12)
     profile += [(head * r * float(np.cos(a)), (ball + (1 - ball) * float(np.sin(a))) * h) for a in crown[1:]]
     model = Model().add("body", lathe(profile))
@@ -229,7 +229,7 @@ def bowling_pin(*, height_m: float, width: float, neck: float, head: float) -> M
 
 @template("table tennis paddle")
 def table_tennis_paddle(*, length_m: float, blade: float, width: float, thick_m: float) -> Model:
-    """Build a paddle that lies, its handle towards -X, with rubber on both sides; ``blade`` and ``width`` over the length."""
+    """Build a lying paddle with its handle to -X and rubber on both sides; ``blade`` and ``width`` are over the length."""
     long, across = blade * length_m, width * length_m
     at = 0.5 * (length_m - long)
     wood = cylinder(0.5, thick_m).scale((long, across, 1)).translate((at, 0, -0.5 * thick_m))
@@ -251,7 +251,7 @@ def table_tennis_paddle(*, length_m: float, blade: float, width: float, thick_m:
 
 @template("rubber duck")
 def rubber_duck(*, length_m: float, width: float, height: float, head: float) -> Model:
-    """Build a bath duck that looks towards -Y, flat below; ``head`` is its head's width over the length."""
+    """Build a bath duck that faces -Y, flat below; ``head`` is its head's width relative to the length."""
     n, wide, tall = length_m, width * length_m, height * length_m
     ball = 0.5 * head * n
     low = 0.62 * tall

@@ -1,4 +1,4 @@
-"""More fruit and vegetables: what stands has its stem up, what lies has it towards +X."""
+"""Further fruit and vegetables: standing ones have their stem up, lying ones have it towards +X."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("plum")
 def plum(*, length_m: float, width: float, cleft: float) -> Model:
-    """Build a plum lying, the hollow of its stem towards +X, a shallow cleft along its upper side."""
+    """Build a lying plum with the stem cavity towards +X and a shallow cleft along its upper side."""
     wide = width * length_m
     profile = [(0, 0.0), (0.2, 0.008), (0.58, 0.08), (0.88, 0.25), (1, 0.48), (0.93, 0.72), (0.68, 0.91), (0.4, 0.985)]
     body = turned([*profile, (0.24, 0.985), (0.08, 0.945), (0, 0.94)], wide, length_m, sides=80)
@@ -26,7 +26,7 @@ def plum(*, length_m: float, width: float, cleft: float) -> Model:
 
 @template("avocado")
 def avocado(*, length_m: float, width: float, neck: float) -> Model:
-    """Build an avocado lying, its stem towards +X; ``neck`` is how thick its neck is over its belly."""
+    """Build a lying avocado with its stem towards +X; ``neck`` is the neck's thickness relative to the belly's."""
     wide = width * length_m
     profile = [(0, 0.0), (0.3, 0.012), (0.72, 0.1), (0.95, 0.26), (1, 0.38), (0.9, 0.56), (0.5 * (0.9 + neck), 0.68)]
     profile += [(neck, 0.8), (0.74 * neck, 0.92), (0.38 * neck, 0.985), (0, 1.0)]
@@ -46,9 +46,9 @@ def avocado(*, length_m: float, width: float, neck: float) -> Model:
 
 
 def _resting_tilt(profile_m: np.ndarray) -> float:
-    """Return how far (rad) a solid of a profile (radius, z) that lies along +X is turned about Y when it is at rest.
+    """Return the rotation (rad) about Y of a solid of revolution with profile (radius, z) lying at rest along +X.
 
-    It rests where its centre of mass is lowest: of the directions near the radial one, that in which it reaches out least.
+    It rests where its centre of mass is lowest, which is the direction near the radial one with the smallest extent.
     """
     radius, z = arc([(r, 0.0, at) for r, at in profile_m], samples=200)[:, [0, 2]].T
     center_m = np.trapezoid(radius**2 * z, z) / np.trapezoid(radius**2, z)
@@ -59,7 +59,10 @@ def _resting_tilt(profile_m: np.ndarray) -> float:
 
 @template("cucumber")
 def cucumber(*, length_m: float, width: float, bend: float) -> Model:
-    """Build a cucumber lying, its stem towards +X; ``bend`` is how far its middle is off the line of its ends, of the length."""
+    """Build a lying cucumber with its stem towards +X.
+
+    ``bend`` is the distance of its middle from the line through its ends, relative to the length.
+    """
     r = 0.5 * width * length_m
     along = np.linspace(0, 1, 40)
     ends = [0.0, 0.015, 0.05, 0.12, 0.3, 0.7, 0.88, 0.96, 0.99, 1.0]
@@ -79,12 +82,12 @@ def cucumber(*, length_m: float, width: float, bend: float) -> Model:
 
 @template("corn")
 def corn(*, length_m: float, width: float, rows: float, husk: float) -> Model:
-    """Build an ear of corn lying, its stalk towards +X; ``rows`` of kernels go round it, ``husk`` of the length is in leaves."""
+    """Build a lying ear of corn with its stalk towards +X, with ``rows`` rows of kernels and ``husk`` of its length in leaves."""
     r, around = 0.5 * width * length_m, 2 * round(0.5 * rows)
     share = [0.0, 0.04, 0.14, 0.4, 0.8, 0.95, 1.0]
     levels = np.linspace(0.0, 1.0, chords(88) + 1)
     radii = r * np.interp(levels, share, [0.3, 0.58, 0.8, 0.97, 1.0, 0.9, 0.5])
-    kernel = 1.6 * np.pi * r / around  # as long along the ear as four fifths of what it is wide
+    kernel = 1.6 * np.pi * r / around  # length along the ear is four fifths of the width
 
     def grained(vertices: np.ndarray) -> np.ndarray:
         angle, z = np.arctan2(vertices[:, 1], vertices[:, 0]), vertices[:, 2]
@@ -109,7 +112,7 @@ def corn(*, length_m: float, width: float, rows: float, husk: float) -> Model:
 
 @template("bell pepper")
 def bell_pepper(*, width_m: float, tall: float, ribs: float, stem_m: float) -> Model:
-    """Build a bell pepper of four lobes that stands on them, its stem up; ``ribs`` is how deep it is furrowed."""
+    """Build a bell pepper standing on its four lobes with its stem up; ``ribs`` is the depth of its furrows."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.09), (0.2, 0.05), (0.45, 0.0), (0.74, 0.07), (0.87, 0.28), (0.96, 0.58), (1, 0.76), (0.9, 0.94)]
     body = turned([*profile, (0.66, 1.0), (0.36, 0.955), (0.14, 0.86), (0, 0.84)], width_m, h, sides=96)

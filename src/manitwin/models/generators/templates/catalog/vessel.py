@@ -1,4 +1,4 @@
-"""What vessels have in common: a profile turned about its axis, hollowed at its wall, with an ear or a stick for a handle."""
+"""Common parts of vessels: a hollow body of revolution with a wall, and handles (an ear or a stick)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.template import Model
 
 RIM_SHARE = 0.05
-"""Of the height: the uppermost part of a wall is its rim."""
+"""Share of the height that is the rim of a wall."""
 _ROWS = 24
 
 
 def shell(profile: list[Point], wall_m: float, floor_m: float) -> tuple[Manifold, Manifold]:
-    """Return the outer solid of a profile (radius, z) counted upward, and what is cut out of it for a wall and a floor."""
+    """Return the outer solid of a profile (radius, z) from bottom to top, and the solid to subtract for a wall and a floor."""
     z = np.array([height for _, height in profile])
     levels = np.linspace(z[0] + floor_m, z[-1], _ROWS)
     radii = np.maximum(np.interp(levels, z, [radius for radius, _ in profile]) - wall_m, 0.2 * wall_m)
@@ -27,7 +27,7 @@ def shell(profile: list[Point], wall_m: float, floor_m: float) -> tuple[Manifold
 def hollowed(
     model: Model, profile: list[Point], wall_m: float, floor_m: float, *handles: tuple[str, Manifold]
 ) -> Model:
-    """Put a vessel of a profile together, as ``put_together`` does."""
+    """Assemble a vessel from a profile, as ``put_together`` does."""
     outer, inner = shell(profile, wall_m, floor_m)
     return put_together(model, outer, inner, profile[-1][1], profile[0][0], *handles)
 
@@ -35,9 +35,9 @@ def hollowed(
 def put_together(
     model: Model, outer: Manifold, inner: Manifold, height_m: float, foot_m: float, *handles: tuple[str, Manifold]
 ) -> Model:
-    """Put a vessel together: ``body`` with ``handles``, cut out at its ``inside``, its upper edge the ``rim``.
+    """Assemble a vessel: a ``body`` with ``handles``, hollowed at its ``inside``, with its upper edge as ``rim``.
 
-    ``foot_m`` is the radius that it stands on.
+    ``foot_m`` is the radius on which it stands.
     """
     model.add("body", outer)
     for name, solid in handles:
@@ -53,7 +53,7 @@ def put_together(
 def ear(
     model: Model, radius_m: float, high_m: float, low_m: float, reach_m: float, thick_m: float
 ) -> tuple[str, Manifold]:
-    """Return an ear towards +X between two heights of a body of a radius, and note its outermost place."""
+    """Return a handle towards +X between two heights of a body of radius ``radius_m``, and add a point at its outermost place."""
     inside = radius_m - 0.5 * thick_m
     path = arc(
         [
@@ -72,7 +72,7 @@ def ear(
 def stick(
     model: Model, radius_m: float, height_m: float, reach_m: float, rise_m: float, half_m: float
 ) -> tuple[str, Manifold]:
-    """Return a long handle towards +X from a wall at a height, and note its middle."""
+    """Return a long handle towards +X from a wall at a height, and add a point in its middle."""
     start, end = 0.97 * radius_m, radius_m + reach_m
     path = arc([(start, 0, height_m), (start + 0.2 * reach_m, 0, height_m + 0.4 * rise_m), (end, 0, height_m + rise_m)])
     middle = path[len(path) // 2 + 2]
@@ -83,6 +83,6 @@ def stick(
 
 
 def bulge(points: list[Point], *, rows: int = 20) -> list[Point]:
-    """Return a smooth profile through (radius, z) points counted upward: Catmull-Rom, its radii kept positive."""
+    """Return a smooth profile through (radius, z) points from bottom to top: a Catmull-Rom spline with positive radii."""
     curve = arc([(radius, 0.0, z) for radius, z in points], samples=rows)
     return [(max(float(radius), 1e-4), float(z)) for radius, _, z in curve]

@@ -15,7 +15,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("mug")
 def mug(*, height_m: float, width: float, wall_m: float, taper: float, handle: float) -> Model:
-    """Build a mug: ``width`` over height, ``taper`` of the foot's radius, ``handle`` reaching out by a share of the height."""
+    """Build a mug; ``width`` and ``handle`` are relative to the height, ``taper`` is the foot's radius relative to the rim's."""
     model, radius = Model(), 0.5 * width * height_m
     profile = rounded([(0.8 * taper * radius, 0), (taper * radius, 0.03 * height_m), (radius, height_m)], 0.008)
     return hollowed(
@@ -45,7 +45,7 @@ def glass(*, height_m: float, width: float, wall_m: float, taper: float) -> Mode
 
 @template("wine glass")
 def wine_glass(*, height_m: float, width: float, stem: float, wall_m: float, foot: float) -> Model:
-    """Build a wine glass: ``stem`` is the share of its height below the bowl, ``foot`` the foot's over the bowl's width."""
+    """Build a wine glass; ``stem`` is the share of its height below the bowl, ``foot`` the foot's width over the bowl's."""
     model, h, r = Model(), height_m, 0.5 * width * height_m
     low = stem * h
     bowl = bulge(
@@ -67,7 +67,7 @@ def wine_glass(*, height_m: float, width: float, stem: float, wall_m: float, foo
 @template("bowl")
 @template("mixing bowl")
 def bowl(*, width_m: float, height: float, wall_m: float, foot: float) -> Model:
-    """Build a bowl on a foot: ``height`` and ``foot`` over the width."""
+    """Build a bowl on a foot; ``height`` and ``foot`` are relative to the width."""
     radius, high = 0.5 * width_m, height * width_m
     turn = np.linspace(0.0, np.pi / 2, 12)
     side = zip(radius * (foot + (1 - foot) * np.sin(turn)), high * (0.06 + 0.94 * (1 - np.cos(turn))), strict=True)
@@ -77,13 +77,13 @@ def bowl(*, width_m: float, height: float, wall_m: float, foot: float) -> Model:
 
 @template("pet bowl")
 def pet_bowl(*, width_m: float, height: float, wall_m: float, flare: float) -> Model:
-    """Build a bowl that is broader at its foot by ``flare`` than at its rim."""
+    """Build a bowl that is wider at its foot than at its rim, by ``flare``."""
     radius, high = 0.5 * width_m, height * width_m
     model = Model()
     outer = lathe(rounded([(radius, 0.0), (radius, 0.004), (radius / flare, high)], 0.006))
     inside = rounded([(0, 2 * wall_m), (0.72 * radius / flare, 2 * wall_m), (radius / flare - wall_m, high)], 0.012)
     top = radius / flare
-    between = (0.5 * (0.93 * top + 0.25 * radius + 0.75 * top), 0.75 * high)  # midway from one wall to the other
+    between = (0.5 * (0.93 * top + 0.25 * radius + 0.75 * top), 0.75 * high)  # midway between the walls
     hollow = lathe([(0.72 * top + 3 * wall_m, -1e-3), (radius - 2 * wall_m, -1e-3), between])
     hollow = hollow - lathe(
         [(0, -2e-3), (0.72 * top + 2 * wall_m, -2e-3), (between[0] - 1e-3, between[1]), (0, between[1])]
@@ -97,7 +97,7 @@ def pet_bowl(*, width_m: float, height: float, wall_m: float, flare: float) -> M
 @template("plate")
 @template("saucer")
 def plate(*, width_m: float, height: float, wall_m: float, well: float) -> Model:
-    """Build a plate or a saucer: ``well`` is the share of its radius that is flat."""
+    """Build a plate or a saucer; ``well`` is the flat share of its radius."""
     radius, high = 0.5 * width_m, height * width_m
     profile = rounded([(well * radius, 0.0), ((well + 0.11) * radius, 0.25 * high), (radius, high)], 0.012)
     return hollowed(Model(), profile, wall_m, wall_m)
@@ -119,10 +119,10 @@ def cup_and_saucer(
     hook: float,
     wall_m: float,
 ) -> Model:
-    """Build a cup with an ear that stands on its saucer.
+    """Build a cup with a handle that stands on its saucer.
 
-    ``saucer`` is the saucer's height over its width, ``cup`` the cup's rim over the saucer's width; the others are the cup's, as
-    a ``tea cup`` has them.
+    ``saucer`` is the saucer's height relative to its width, ``cup`` the cup's rim relative to the saucer's width. The others are
+    those of a ``tea cup``.
     """
     model, dish, radius = Model(), 0.5 * width_m, 0.5 * cup * width_m
     foot, height, up = taper * radius, rim * cup * width_m, saucer * width_m
@@ -135,7 +135,7 @@ def cup_and_saucer(
     side = CupSide(radius, height, belly * radius, bottom * height, foot, flare * radius, wall_m)
     outer, inner = side.solids()
     reach, thick = handle * height, EAR_SHARE * cup * width_m
-    # an ear keeps clear of a high saucer, from which a question mark's lower half is far
+    # The handle must clear a high saucer; the lower half of a question-mark handle is far from it.
     outward = radius + (0.9 - 0.4 * float(np.clip(hook, 0.0, 1.0))) * reach
     below_ear = float(np.interp(outward, *np.array(dish_side).T)) - floor
     joined = max(join, min((below_ear + thick) / height, HIGHEST_JOIN))
@@ -154,7 +154,7 @@ def cup_and_saucer(
 
 @template("pitcher")
 def pitcher(*, height_m: float, width: float, wall_m: float, neck: float, spout: float) -> Model:
-    """Build a jug with an ear towards +X and a spout towards -X."""
+    """Build a jug with a handle towards +X and a spout towards -X."""
     model, h, r = Model(), height_m, 0.5 * width * height_m
     profile = bulge([(0.8 * r, 0), (0.98 * r, 0.18 * h), (r, 0.38 * h), (neck * r, 0.8 * h), (0.95 * neck * r, h)])
     profile = [(0.7 * r, 0.0), *profile[1:]]
@@ -179,7 +179,7 @@ def pitcher(*, height_m: float, width: float, wall_m: float, neck: float, spout:
 
 @template("teapot")
 def teapot(*, height_m: float, width: float, spout: float, wall_m: float) -> Model:
-    """Build a round teapot with its lid on: the spout towards -X reaches out by a share of the height."""
+    """Build a round teapot with its lid on; the spout towards -X protrudes by ``spout`` of the height."""
     model, h, r = Model(), 0.82 * height_m, 0.5 * width * height_m * 0.8
     profile = bulge([(0.6 * r, 0), (0.95 * r, 0.25 * h), (r, 0.5 * h), (0.8 * r, 0.82 * h), (0.45 * r, h)])
     reach = r + spout * height_m
@@ -222,7 +222,7 @@ def tray(*, length_m: float, width: float, height_m: float, wall_m: float) -> Mo
 
 @template("measuring cup")
 def measuring_cup(*, height_m: float, width: float, wall_m: float, handle: float) -> Model:
-    """Build a straight measuring cup with an ear and a small spout towards -X."""
+    """Build a straight measuring cup with a handle and a small spout towards -X."""
     model, radius = Model(), 0.5 * width * height_m
     profile = rounded([(0.82 * radius, 0), (0.86 * radius, 0.03 * height_m), (radius, height_m)], 0.006)
     lip = cylinder(0.25 * radius, 0.1 * height_m, top_radius_m=0.32 * radius).translate(

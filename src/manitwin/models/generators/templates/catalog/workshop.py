@@ -1,4 +1,4 @@
-"""Tools to measure, hold, rake, paint and look with: the working end towards +X where they lie, the front towards -Y."""
+"""Tools to measure, hold, rake, paint and magnify: lying with the working end to +X, or standing with the front to -Y."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.models.generators.templates.template import Model, template
 
 @template("tape measure")
 def tape_measure(*, length_m: float, height: float, thick: float) -> Model:
-    """Build a tape measure that stands on its flat side, the tape's hook towards +X; ``height`` and ``thick`` over the length."""
+    """Build a tape measure standing on its flat side, with the hook to +X; ``height`` and ``thick`` are over the length."""
     high, deep, end = height * length_m, thick * length_m, 0.44 * length_m
     outline = [(-end, 0.0), (end, 0.0), (end, 0.34 * high), (0.8 * end, 0.86 * high), (0.5 * end, high), (-end, high)]
     shape = polygon([(x, z) for x, z in outline]) ^ polygon(outline, radius_m=0.16 * high)
@@ -45,7 +45,7 @@ def tape_measure(*, length_m: float, height: float, thick: float) -> Model:
 
 @template("spirit level")
 def spirit_level(*, length_m: float, height_m: float, thick: float) -> Model:
-    """Build a level that stands on its measuring face: a vial in the middle of its upper edge, two in windows at its ends."""
+    """Build a level standing on its measuring face, with a vial in its upper edge and two in windows at its ends."""
     high, deep = height_m, thick * height_m
     model = Model().add("body", box(length_m, deep, high, radius_m=0.0012), "body")
     bore, half = 0.19 * high, max(0.024, 0.05 * length_m)
@@ -73,7 +73,7 @@ def spirit_level(*, length_m: float, height_m: float, thick: float) -> Model:
 
 @template("magnet")
 def magnet(*, length_m: float, width: float, thick: float) -> Model:
-    """Build a horseshoe magnet lying flat, its poles towards +X."""
+    """Build a lying horseshoe magnet with its poles towards +X."""
     r, deep, end = 0.5 * width * length_m, thick * length_m, 0.5 * length_m
     inner, bow, cap = 0.5 * r, r - end, 0.2 * length_m
     outer = polygon([(bow, -r), (end - cap, -r), (end - cap, r), (bow, r)]) + polygon(_round(r, bow))
@@ -94,7 +94,7 @@ def _round(radius_m: float, x_m: float) -> np.ndarray:
 
 @template("hand rake")
 def hand_rake(*, length_m: float, head: float, width_m: float) -> Model:
-    """Build a hand cultivator lying on the points of its three tines and the end of its handle."""
+    """Build a hand cultivator lying on the tips of its three tines and the end of its handle."""
     start, end, drop = (0.5 - head) * length_m, 0.5 * length_m, 0.05
     lean = float(np.arcsin((drop - 0.014) / (0.95 * length_m)))
     model = Model()
@@ -157,7 +157,7 @@ def paint_roller(*, length_m: float, width_m: float, roll_m: float, handle: floa
 
 @template("squeegee")
 def squeegee(*, length_m: float, width: float, handle_m: float) -> Model:
-    """Build a window squeegee lying flat: a rubber blade in a channel across the end of its handle."""
+    """Build a lying window squeegee: a rubber blade in a channel across the end of its handle."""
     wide, end, r = width * length_m, 0.5 * length_m, 0.5 * handle_m
     channel = box(0.016, wide, 0.014, radius_m=0.0025).translate((end - 0.019, 0, -0.007))
     model = Model().add("channel", channel, "channel")
@@ -177,7 +177,7 @@ def squeegee(*, length_m: float, width: float, handle_m: float) -> Model:
 
 @template("magnifying glass")
 def magnifying_glass(*, length_m: float, lens: float, thick_m: float) -> Model:
-    """Build a lens in a ring on a handle, lying flat; ``lens`` is the ring's diameter over the length."""
+    """Build a lying lens in a ring on a handle; ``lens`` is the ring's diameter relative to the length."""
     r, end = 0.5 * lens * length_m, 0.5 * length_m
     at, band = end - r, max(0.0028, 0.075 * r)
     ring = rounded(
@@ -205,7 +205,7 @@ def magnifying_glass(*, length_m: float, lens: float, thick_m: float) -> Model:
 
 @template("mallet")
 def mallet(*, length_m: float, head: float, face_m: float, handle_m: float) -> Model:
-    """Build a mallet that lies, its faces towards -Y and +Y; ``head`` is the head's length over the tool's."""
+    """Build a lying mallet with its faces towards -Y and +Y; ``head`` is the head's length relative to the tool's."""
     across, at = head * length_m, 0.5 * length_m - 0.5 * face_m
     profile = rounded(
         [(0.0, 0.0), (0.46 * face_m, 0.0), (0.5 * face_m, 0.5 * across), (0.46 * face_m, across), (0.0, across)], 0.006
