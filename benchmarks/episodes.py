@@ -1,6 +1,6 @@
 """Print the figures of folders of episodes, one row each: outcomes of the attempts, the worst object, errors and cost.
 
-    manitwin trajectories TWINS -n 625 --seed 11 -o calibration          fits nothing but which grasps are retired
+    manitwin trajectories TWINS -n 625 --seed 11 -o calibration          determines only the retired grasps
     manitwin trajectories TWINS -n 1250 --seed 21 -o empty --no-retire
     manitwin trajectories TWINS -n 1250 --seed 31 -o five --others 5 --no-retire
     python benchmarks/episodes.py empty five

@@ -48,10 +48,9 @@ PROGRAMS = ("MJCF in MuJoCo", "URDF in SAPIEN", "URDF in PyBullet", "SDF in PyBu
 
 @dataclass(frozen=True)
 class Body:
-    """The object as a program has loaded it.
+    """The object as loaded by a program: ``points (N, 3)`` span its collision shapes; ``settle`` is None without physics.
 
-    ``points (N, 3)`` span the collision shapes. ``settle`` takes the object's pose on the plane and returns the pose after two
-    seconds; it is None without physics.
+    ``settle`` takes the object's pose on the plane and returns the pose after two seconds.
     """
 
     mass_kg: float
@@ -161,10 +160,7 @@ def in_pybullet(path: Path) -> Body:
 
 
 def _extremes_in_pybullet(client: int, body: int, inertial: np.ndarray) -> np.ndarray:
-    """Return the lowest and highest corner ``(2, 3)`` of a body from its distances to six walls.
-
-    PyBullet gives no access to the hulls.
-    """
+    """Return the lowest and highest corner ``(2, 3)`` by distances to six walls, as PyBullet shows no hulls."""
     quaternion = quaternion_wxyz(inertial[:3, :3])
     pybullet.resetBasePositionAndOrientation(body, inertial[:3, 3], np.roll(quaternion, -1), client)
     corners = np.zeros((2, 3))

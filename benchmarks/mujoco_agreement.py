@@ -1,7 +1,7 @@
 """Compare masses, centres and inertias read from MJCF and URDF files with those of MuJoCo's own compiler.
 
 python benchmarks/mujoco_agreement.py FOLDER...                  every MJCF and URDF asset below the folders
-python benchmarks/mujoco_agreement.py FOLDER... --most 40        so many of each folder, drawn with --seed
+python benchmarks/mujoco_agreement.py FOLDER... --most 40        that many of each folder, drawn with --seed
 
 MuJoCo loads the file itself, in a separate process. The bodies that the reader merged into one are summed in world axes and
 compared with the values read, as far as the file declares them. Prints each asset that differs, and the counts.

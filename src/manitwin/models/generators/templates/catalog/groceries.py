@@ -195,7 +195,7 @@ def chocolate_bar(*, length_m: float, width: float, thick_m: float, wrapped: flo
 def cheese(*, length_m: float, angle: float, height: float, holes: float) -> Model:
     """Build a lying wedge of a round cheese with its tip towards +X.
 
-    ``angle`` is in rad; ``holes`` is the width of its holes relative to its own.
+    ``angle`` is in rad; ``holes`` is the width of the largest hole relative to the height.
     """
     h, half = height * length_m, 0.5 * angle
     around = np.pi + np.linspace(-half, half, 24)
