@@ -49,7 +49,7 @@ def is_unseen(category: str) -> bool:
 
 
 def draw_thing(rng: np.random.Generator, beside: Thing | None, part: Part) -> Thing:
-    """Render a template in drawn colours, from a viewpoint like that of ``beside`` if it is given."""
+    """Render a template in drawn colours, at the camera elevation of ``beside`` if it is given."""
     templates = load_templates()
     names = [name for name in COMPOSITE_CATEGORIES if part != "training" or not is_unseen(name)]
     while True:

@@ -130,7 +130,7 @@ def _upper_side(known: Known) -> np.ndarray:
 
 
 def _known_opening(known: Known) -> np.ndarray:
-    """Return the plane of the rim of a known opening that is no part of its own, or else the upper side."""
+    """Return the samples in the plane of the first known opening, or the upper side if there is none."""
     openings = [point for point in known.made.points if point.kind == "opening"]
     if not openings:
         return _upper_side(known)

@@ -55,7 +55,7 @@ def compared(path: Path, root: Path) -> tuple[str, str]:
 def head_of(asset: Asset, model: mujoco.MjModel, root: Path) -> int | None:
     """Return the first body of the rigid group that the reader takes.
 
-    It is found by its name, else it is the first free body, else the first one with a shape.
+    It is found by its name, else it is the first free group (MJCF) with a shape, else the first group with a shape.
     """
     name = asset.name if asset.format == "mjcf" else str(open_urdf(asset.path, root).links[0][0].get("name"))
     named = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)

@@ -217,7 +217,7 @@ def verdict(category: str, seen: np.ndarray, limit: float, highest: dict[str, fl
 
 
 def print_sizes(part_of: str, rows: list[tuple[str, np.ndarray]], highest: dict[str, float]) -> None:
-    """Print the usual size and bulk density of all and of likely categories in comparison with those of unnamed objects."""
+    """Print the error of the usual size and bulk density of all and of likely categories for unnamed objects."""
     names, off = load_names().names, []
     for category, seen in rows:
         truth = named(category)

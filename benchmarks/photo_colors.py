@@ -122,7 +122,7 @@ def is_said(said: str, truth: str) -> bool:
 def draw(category: str, word: str, case: int) -> tuple[np.ndarray, dict[str, float]] | None:
     """Return a photo ``(H, W, 4) uint8`` with the true mask as alpha, and the shares of the object's colours.
 
-    Returns None for bare metal.
+    Returns None for bare metal, and where the template cannot be made in that colour.
     """
     rgb = tuple(int(COLORS[word][i : i + 2], 16) / 255 for i in (0, 2, 4))
     rng = np.random.default_rng([case, 1])

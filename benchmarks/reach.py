@@ -3,8 +3,8 @@
     python benchmarks/reach.py TWINS [--starts 2] [--robots panda ur5_panda ...]
 
 A grasp counts as reachable if one of its two orientations has a collision-free inverse-kinematics solution and a straight
-approach. ``own`` are grasps of the robot's own gripper; ``transferred`` are those of another gripper, with the fingertips at the
-verified positions.
+approach. For a twin without grasps of the robot's own gripper, those of another gripper are transferred, with the fingertips at
+the verified positions.
 """
 
 from __future__ import annotations
