@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def costs_of(data: Path) -> dict[str, dict[str, float]]:
-    """Return the CPU seconds of each stage of each twin, and its grasps, by twin id."""
+    """Return CPU seconds by stage and in total, size in megabytes, and grasp counts of each twin, by twin id."""
     found = {}
     for path in sorted(data.glob("twins/*/*/run.json")):
         stages = {name: cost["cpu_seconds"] for name, cost in json.loads(path.read_text())["stages"].items()}
