@@ -38,8 +38,7 @@ def export(
         ),
     ] = None,
 ) -> None:
-    """Export twins as MJCF, URDF, SDF, USD, GLB or for RoboTwin, ManiSkill, Isaac Lab, graspers; scenes as MJCF,"
-    " SDF, USD."""
+    """Export twins as MJCF, URDF, SDF, USD, GLB or for RoboTwin, ManiSkill, Isaac Lab, graspers; scenes as MJCF, SDF, USD."""
     from manitwin.assets.writers.licenses import allowed_licenses
     from manitwin.assets.writers.registry import chosen_formats
     from manitwin.errors import UsageError
