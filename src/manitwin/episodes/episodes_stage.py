@@ -55,7 +55,7 @@ class EpisodesStage:
     """Makes the episodes of a batch; each has its own generator, seeded by the run's seed and the episode's number."""
 
     name = "episodes"
-    version = "16"
+    version = "17"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (EPISODES, ATTEMPTS, "batch")
     needs: Resource = "cpu"
@@ -269,8 +269,7 @@ class EpisodesStage:
             return goal_instructions(setting.skill_goal.goal.literals[0], words, seed=seed)
         return episode_instructions(
             self._language(target.twin_id),
-            target.object_to_world[:3, 3],
-            task.goal_object_to_world[:3, 3],
+            *task.way_m,
             seed=seed,
             others=[self._language(each.twin_id) for place, each in enumerate(task.objects) if place != task.target],
         )

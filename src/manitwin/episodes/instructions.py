@@ -38,8 +38,8 @@ _RIGHT = ("further to the right", "to the right")
 
 def episode_instructions(
     language: Language,
-    start_position_m: np.ndarray,
-    goal_position_m: np.ndarray,
+    start_m: np.ndarray,
+    goal_m: np.ndarray,
     *,
     seed: int,
     count: int = 6,
@@ -47,12 +47,14 @@ def episode_instructions(
 ) -> tuple[str, ...]:
     """Return ``count`` different English instructions to move an object from start to goal ``(3,)``, world frame.
 
-    Left and right are as seen by the robot, which looks along +X. Unknown attributes are not mentioned. A name that also fits
-    one of the ``others`` in the scene is avoided if another name is unambiguous; otherwise the most specific one is used.
-    Deterministic for equal arguments. Raises UsageError for a count below 1 or above the number of combinations.
+    Start and goal are positions of the centre of mass: the frame's origin of a lying bottle is at one end, and moves differently
+    if the bottle is turned. Left and right are as seen by the robot, which looks along +X. Unknown attributes are not mentioned.
+    A name that also fits one of the ``others`` in the scene is avoided if another name is unambiguous; otherwise the most
+    specific one is used. Deterministic for equal arguments. Raises UsageError for a count below 1 or above the number of
+    combinations.
     """
     names = names_of(language, others)
-    way = np.asarray(goal_position_m, float)[:2] - np.asarray(start_position_m, float)[:2]
+    way = np.asarray(goal_m, float)[:2] - np.asarray(start_m, float)[:2]
     where, along = _direction(way)
     distance_cm = round(100 * _DISTANCE_STEP_M * round(float(np.linalg.norm(way)) / _DISTANCE_STEP_M))
     templates = [*TEMPLATES, *([WITH_DISTANCE] if along is not None and distance_cm else [])]

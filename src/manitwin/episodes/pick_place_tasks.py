@@ -64,6 +64,15 @@ class PickPlaceTask:
     target: int
     goal_object_to_world: np.ndarray
 
+    @property
+    def way_m(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where the target's centre of mass is at the beginning and at the goal, ``(3,)`` each: what a person sees move.
+
+        The origin of its frame does not tell: that of a bottle that lies is at an end, and goes another way where it is turned.
+        """
+        target = self.objects[self.target]
+        return target.center_of_mass_m, replace(target, object_to_world=self.goal_object_to_world).center_of_mass_m
+
 
 @dataclass(frozen=True)
 class PlacingArea:
@@ -119,7 +128,8 @@ def sample_task(
     """
     for _ in range(OTHERS_TRIED):
         start = area.draw(target.footprint, [], rng)
-        goal = None if start is None else _elsewhere(target.footprint, start[:2, 3], [], area, rng)
+        middle_m = transform_points(target.object_to_plane, target.body.center_of_mass_m[None])[0]
+        goal = None if start is None else _elsewhere(target.footprint, middle_m, start, [], area, rng)
         if start is None or goal is None:
             continue
         around = _others(others, count, [_at(target.footprint, pose) for pose in (start, goal)], area.wider(), rng)
@@ -160,14 +170,18 @@ def free_goal(
     moved = objects[target]
     object_to_plane, corners = on_its_surface(moved, area.support.height_m)
     taken = footprints_of_others(objects, target)
-    pose = _elsewhere(corners, moved.object_to_world[:2, 3], taken, area, rng)
+    here = transform(translation=moved.center_of_mass_m * (1, 1, 0))
+    pose = _elsewhere(corners, np.zeros(3), here, taken, area, rng)
     return None if pose is None else pose @ object_to_plane
 
 
 def on_its_surface(moved: PlacedObject, height_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return an object's pose ``(4, 4)`` in its orientation above the origin of a plane at ``height_m``, and its footprint."""
+    """Return an object's pose ``(4, 4)`` in its orientation on a level plane at ``height_m``, and its footprint.
+
+    The centre of mass is above the plane's origin, because the frame's origin of a lying bottle is at one end.
+    """
     here = moved.object_to_world
-    center = transform(translation=np.array([here[0, 3], here[1, 3], 0.0]))
+    center = transform(translation=moved.center_of_mass_m * (1, 1, 0))
     object_to_plane = inverse(center) @ here
     lowest_m = float(transform_points(here, np.concatenate(moved.body.hulls))[:, 2].min())
     object_to_plane[2, 3] += height_m - lowest_m
@@ -204,11 +218,20 @@ def free_poses(
 
 
 def _elsewhere(
-    corners: np.ndarray, here_m: np.ndarray, taken: Sequence[np.ndarray], area: PlacingArea, rng: np.random.Generator
+    corners: np.ndarray,
+    middle_m: np.ndarray,
+    here: np.ndarray,
+    taken: Sequence[np.ndarray],
+    area: PlacingArea,
+    rng: np.random.Generator,
 ) -> np.ndarray | None:
+    """Draw a free pose in which the middle ``(3,)`` of a footprint, in its own frame, is far enough from where it is ``here``."""
     for _ in range(POSES_TRIED):
         pose = area.draw(corners, taken, rng)
-        if pose is None or np.linalg.norm(pose[:2, 3] - here_m) >= MIN_MOVE_M:
+        if pose is None:
+            return None
+        way_m = transform_points(pose, middle_m[None]) - transform_points(here, middle_m[None])
+        if np.linalg.norm(way_m[0, :2]) >= MIN_MOVE_M:
             return pose
     return None
 

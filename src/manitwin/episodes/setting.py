@@ -18,6 +18,7 @@ from manitwin.episodes.pick_place_tasks import (
 )
 from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings
 from manitwin.robots.robot import Workspace
+from manitwin.scenes.layouts.placing import in_workspace
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 from manitwin.scenes.layouts.surroundings import make_furniture, make_lights
 from manitwin.scenes.loaded_scene import Scene, furniture_boxes
@@ -99,8 +100,10 @@ def scene_setting(
     supporting = {each.supported_by for each in record.objects}
     able = [
         number
-        for number, each in enumerate(record.objects)
-        if each.name not in supporting and _in_reach(each.position_m, workspace) and graspable(each.twin_id)
+        for number, each in enumerate(objects)
+        if each.name not in supporting
+        and in_workspace(each.center_of_mass_m[None, :2], workspace)[0]
+        and graspable(each.twin_id)
     ]
     supports = {support.name: support for support in record.furniture.supports}
     boxes = tuple(furniture_boxes(record.furniture))
@@ -150,7 +153,3 @@ def _partners(skill: Skill, around: Surroundings, target: int, rng: np.random.Ge
         for number in rng.permutation(len(twins))
         if number != target and skill.suits(around.pool, twins[target], twins[int(number)])
     ]
-
-
-def _in_reach(position_m: Sequence[float], workspace: Workspace) -> bool:
-    return workspace.min_radius_m <= float(np.hypot(position_m[0], position_m[1])) <= workspace.max_radius_m

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.geometry.poses import quaternion_wxyz, transform_points
 from manitwin.geometry.ray_caster import RayCaster
 
 FURNITURE_FRICTION = 0.5
@@ -57,6 +57,11 @@ class PlacedObject:
     twin_id: str
     body: RigidBody
     object_to_world: np.ndarray
+
+    @property
+    def center_of_mass_m(self) -> np.ndarray:
+        """The centre of mass in the world ``(3,)``, m."""
+        return np.asarray(transform_points(self.object_to_world, self.body.center_of_mass_m[None])[0])
 
 
 @dataclass(frozen=True)

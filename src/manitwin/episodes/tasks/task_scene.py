@@ -17,6 +17,7 @@ from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings, openi
 from manitwin.episodes.target_grasps import TargetGrasp, shuffled
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.robot import Robot
+from manitwin.scenes.layouts.placing import in_workspace
 from manitwin.scenes.layouts.pool import Pool
 from manitwin.scenes.loaded_scene import Scene, furniture_boxes
 from manitwin.twin.record import Language
@@ -70,13 +71,10 @@ class TaskScene:
 
     def why_not_taken(self, number: int) -> str | None:
         """Return why an object cannot be grasped: ``carries_another``, ``out_of_reach`` or ``no_grasp``; None if it can."""
-        placed = next(each for each in self.scene.record.objects if each.name == self.names[number])
-        workspace = self.robot.workspace
-        radius_m = float(np.hypot(*placed.position_m[:2]))
-        angle_rad = abs(float(np.arctan2(placed.position_m[1], placed.position_m[0])))
+        placed = self.objects[number]
         if placed.name in {each.supported_by for each in self.scene.record.objects}:
             return "carries_another"
-        if not (workspace.min_radius_m <= radius_m <= workspace.max_radius_m and angle_rad <= workspace.half_angle_rad):
+        if not in_workspace(placed.center_of_mass_m[None, :2], self.robot.workspace)[0]:
             return "out_of_reach"
         return None if self.grasps(placed.twin_id) else "no_grasp"
 
