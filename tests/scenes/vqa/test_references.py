@@ -72,6 +72,19 @@ def test_containers() -> None:
     assert [is_container(each) for each in ("hammer", "scissors", "gear")] == [False] * 3
 
 
+def test_what_a_thing_holds_or_is_made_of_is_not_its_noun() -> None:
+    assert [noun_of(each) for each in ("jar of honey", "bottle of wine", "bag with handles", "pair of pliers")] == [
+        "jar", "bottle", "bag", "pliers",
+    ]  # fmt: skip
+    assert is_container("jar of honey") and is_container("can of tuna")
+    assert is_container("box of cereal") is None  # as a cereal box
+    for asked in ("jar", "honey", "honey jar", "jam jar"):
+        assert could_be_asked_for(asked, {"jar of honey"}), asked
+    assert could_be_asked_for("jar of honey", {"jam jar"}) and could_be_asked_for("soap", {"bar of soap"})
+    assert not could_be_asked_for("mug", {"jar of honey"})
+    assert one_of("pair of pliers", "red") == "red pair of pliers"
+
+
 def test_who_serves_tea_in_a_cup_holds_hot_drinks_in_a_mug() -> None:
     assert _content("holding hot drinks") & _content("serving tea or coffee")
     assert _content("drinking wine") & _content("carrying drinking water")

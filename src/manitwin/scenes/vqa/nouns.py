@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 from manitwin.models.annotators import prior_names
@@ -25,16 +26,26 @@ PAIRS = frozenset(
 """Plural nouns whose unit is a pair."""
 
 
+_WHAT_FOLLOWS = re.compile(r" (?:of|with|for|in) ")
+
+
 def noun_of(category: str) -> str:
-    """Return the noun of a category: ``bottle`` for ``ketchup bottle``, but ``magnifying glass`` for itself."""
-    return category if category in OF_ANOTHER_KIND else category.split()[-1]
+    """Return the noun of a category: ``bottle`` for ``ketchup bottle``, ``jar`` for ``jar of honey``, ``trash can`` for itself."""
+    if category in OF_ANOTHER_KIND:
+        return category
+    return _WHAT_FOLLOWS.split(category.removeprefix("pair of "), maxsplit=1)[0].split()[-1]
+
+
+def words_of(category: str) -> frozenset[str]:
+    """Return the words that may stand for a category: its noun and its last word (a jar of honey may be called honey)."""
+    return frozenset({noun_of(category), category.split()[-1]})
 
 
 @cache
 def counter_of(category: str) -> str | None:
     """Return the counter of a category: ``pair of`` scissors, a ``bar of`` soap; None for countable nouns."""
     if category.split()[-1] in PAIRS:
-        return "pair of"
+        return None if category.startswith("pair of ") else "pair of"
     prior = prior_names.named(category)
     return None if prior is None else prior_names.counter_of(prior, category)
 
@@ -43,10 +54,11 @@ def counter_of(category: str) -> str | None:
 def nouns_of(category: str) -> frozenset[str]:
     """Return every noun that may denote a category.
 
-    These are its own noun, those of its components (of a cup and saucer), and those of its aliases in the priors (a mug is a
-    coffee cup).
+    These are its own noun, those of its components (of a cup and saucer), that of its contents (honey of a jar of honey), and
+    those of its aliases in the priors (a mug is a coffee cup).
     """
     prior = prior_names.named(category)
     names = {category, *(prior.aliases if prior is not None else ())}
-    found = {noun_of(each) for name in names for each in name.split(" and ")}
+    said = [each for name in names for each in name.split(" and ")]
+    found = {noun_of(each) for each in said} | {each.split()[-1] for each in said if " of " in each}
     return frozenset(found - {category.split()[-1]} if category in OF_ANOTHER_KIND else found)

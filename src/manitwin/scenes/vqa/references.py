@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 from manitwin.models.annotators.surface_color import are_near
 from manitwin.models.annotators.words import article
-from manitwin.scenes.vqa.nouns import counter_of, noun_of, nouns_of
+from manitwin.scenes.vqa.nouns import counter_of, noun_of, nouns_of, words_of
 from manitwin.scenes.vqa.things import Seen, Thing, View
 
 MARGIN_PX = 40
@@ -95,8 +95,8 @@ def a_or_an(noun: str) -> str:
 def could_be_asked_for(category: str, present: Collection[str]) -> bool:
     """Return whether a reader may take one of the ``present`` categories for a category."""
     vessels = {noun_of(each) for each in present} & {*CONTAINERS, *OTHER_VESSELS}
-    names = frozenset().union(*(nouns_of(each) | {each.split()[-1]} for each in present))
-    return bool((nouns_of(category) | {category.split()[-1]}) & names) or (
+    names = frozenset().union(*(nouns_of(each) | words_of(each) for each in present))
+    return bool((nouns_of(category) | words_of(category)) & names) or (
         noun_of(category) in ("container", "box") and bool(vessels)
     )
 
@@ -106,5 +106,5 @@ def is_container(category: str) -> bool | None:
     noun = noun_of(category)
     if noun in CONTAINERS:
         return True
-    called = {category.split()[-1], *nouns_of(category)}
+    called = words_of(category) | nouns_of(category)
     return None if called & {*CONTAINERS, *OTHER_VESSELS} else False
