@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from manitwin.episodes.instructions import episode_instructions
-from manitwin.episodes.naming import names_of
+from manitwin.episodes.naming import names_of, tells_apart
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.annotators.words import write_captions
@@ -141,3 +141,27 @@ def test_a_name_that_fits_another_object_too_is_left_out() -> None:
 def test_a_count_that_cannot_be_met_is_an_error(count: int) -> None:
     with pytest.raises(UsageError, match="give 1 to"):
         said(words(), count=count)
+
+
+@pytest.mark.parametrize(
+    ("category", "other"),
+    [
+        ("cup", "measuring cup"),
+        ("cup", "mug"),
+        ("bowl", "sugar bowl"),
+        ("jar", "jar of honey"),
+        ("spoon", "cooking spoon"),
+    ],
+)
+def test_a_name_that_another_kind_goes_by_too_is_not_said(category: str, other: str) -> None:
+    thing = words(category=category, color="red", caption=f"A red {category}.")
+    blue = words(category=other, color="blue", caption=f"A blue {other}.")
+    told = names(thing, blue)
+    assert told and all("red" in name for name in told)
+    assert names(blue, thing)[0] == other  # the longer name means one alone
+    assert not tells_apart(thing, [words(category=other, color="red", caption=f"A red {other}.")])
+
+
+def test_what_only_ends_alike_is_another_thing() -> None:
+    assert names(words(category="glass"), words(category="magnifying glass"))[0] == "glass"
+    assert names(words(category="cookie box"), words(category="cracker box"))[0] == "cookie box"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from manitwin.models.annotators.prior_names import counter_of, lookup, normalised
 from manitwin.models.annotators.words import joined
+from manitwin.scenes.vqa.nouns import names_cut_down
 from manitwin.twin.record import Language
 
 NAMELESS = "object"
@@ -31,6 +32,7 @@ _OF_ONE_MATERIAL = frozenset(
 _SINGULAR_IN_S = frozenset(("lens", "thermos", "gas", "canvas", "atlas"))
 _FINITE_VERB = re.compile(r"\b(?:is|are|was|has|have|sits|stands|lies|can|features|shows|appears|looks)\b")
 _CAPTION_WORDS = 8
+_SEEN = frozenset(("color", "material", "size"))
 _COLORS = 2
 
 
@@ -46,9 +48,10 @@ class Name:
 
 @dataclass(frozen=True)
 class _Told:
-    """Usable parts of a twin's language record; None if a part is not usable."""
+    """Usable parts of a twin's language record; None if a part is not usable. ``nouns``: further nouns that may denote it."""
 
     noun: str
+    nouns: frozenset[str]
     plural: bool
     in_pairs: bool
     color: str | None
@@ -103,10 +106,14 @@ def _before(told: _Told, *attributes: str) -> str | None:
 
 
 def _fits(name: Name, told: _Told, other: _Told) -> bool:
-    """Tell whether a name could also refer to another object."""
-    if other.noun != told.noun and told.noun != NAMELESS:
-        return False
-    return all(getattr(other, attribute) == getattr(told, attribute) for attribute in name.uses)
+    """Tell whether a name could also refer to another object: "the cup" to a measuring cup or a mug.
+
+    Objects with different nouns are distinguished by visible attributes only, because their records may omit uses and parts.
+    """
+    if other.noun == told.noun or told.noun == NAMELESS:
+        return all(getattr(other, attribute) == getattr(told, attribute) for attribute in name.uses)
+    seen = ({"color"} if "caption" in name.uses else set()) | (name.uses & _SEEN)
+    return told.noun in other.nouns and all(getattr(other, each) == getattr(told, each) for each in seen)
 
 
 def _told(language: Language) -> _Told:
@@ -122,6 +129,7 @@ def _told(language: Language) -> _Told:
     edible = prior is not None and prior.surface == "food skin"
     return _Told(
         noun=noun,
+        nouns=names_cut_down((category, *(prior.aliases if prior is not None else ()))),
         plural=plural,
         in_pairs=in_pairs,
         color=_color(language.color),

@@ -6,8 +6,9 @@ import re
 
 import pytest
 
-from manitwin.episodes.goals.goal import Literal
+from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.goals.goal_instructions import TEMPLATES, goal_instructions
+from manitwin.episodes.tasks.phrasings import task_instructions
 from manitwin.twin.record import Language
 
 OF_ONE = {"upright", "lifted", "pressed", "handed_over"}
@@ -48,3 +49,24 @@ def test_an_end_that_may_be_no_tip_is_not_called_one() -> None:
 def test_what_may_lie_on_something_is_not_said_to_stand_there() -> None:
     """A hammer goes onto a brick, and a bottle onto a loaf, as they lie there best."""
     assert not [each for each in said("on", "hammer") if "stand" in each]
+
+
+def test_what_may_be_upside_down_is_not_said_to_have_fallen_over() -> None:
+    assert not [each for each in said("upright", "mug") if "fall" in each]
+
+
+def test_a_statement_is_not_joined_to_another_instruction() -> None:
+    """ "Press the mug, and after that the lid is too close to the bowl: move it away" is no sentence."""
+    told = {"color": "red", "material": "steel", "size": "12 x 9 x 8 cm", "shape": "long", "function": "work"}
+    words = {
+        name: Language(category=category, **told, caption=f"A {category}.", captions=[])
+        for name, category in {"object_00": "mug", "object_01": "bowl", "object_02": "lid"}.items()
+    }
+    literals = (Literal("away_from", "object_02", "object_01"), Literal("near", "object_00", "object_01"))
+    one = [t for seed in range(20) for t in task_instructions(Goal(literals[:1]), words, seed=seed)[0]]
+    assert any("is too close" in each for each in one)
+    for seed in range(20):
+        spoken, held_out = task_instructions(Goal(literals), words, seed=seed)
+        assert len(spoken) >= 3 and held_out
+        for each in (*spoken, *held_out):
+            assert not re.search(r"(?:^first|, then|, and then|, and after that|^) ?the ", each), each

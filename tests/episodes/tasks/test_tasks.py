@@ -32,7 +32,7 @@ from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 
 GUARDED = {"place_in", "press", "push", "strike", "wipe"}  # moves that end as something is felt
 CONFIG = TasksConfig(seed=5, per_scene=5, two_literal_share=0.2, tries_of_kind=3)
-CATEGORIES = ("brick", "block", "tea box")
+CATEGORIES = ("brick", "carton", "tea box")  # a brick may be called a block
 
 
 @pytest.fixture(scope="module")
@@ -298,7 +298,7 @@ def test_a_model_proposes_literals_and_what_cannot_be_is_counted(
         return {
             "tasks": [
                 {"instruction": "bring them together", "literals": [first]},
-                {"instruction": "put it in the block", "literals": [literal("in", "object_00", "object_01")]},
+                {"instruction": "put it in the carton", "literals": [literal("in", "object_00", "object_01")]},
                 {"instruction": "both", "literals": [first, literal("left_of", "object_01", "object_02")]},
                 {"instruction": "nothing", "literals": []},
             ]

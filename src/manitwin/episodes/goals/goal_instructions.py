@@ -51,7 +51,7 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "pick up {a} and keep {it} apart from {b}",
     ),
     "upright": (
-        "stand {a} up", "put {a} upright", "{a} {have} fallen over: stand {it} up", "set {a} back on {its} base",
+        "stand {a} up", "put {a} upright", "turn {a} the right way up and set {it} down", "set {a} back on {its} base",
         "pick up {a} and put {it} down upright", "please stand {a} upright again",
     ),
     "lifted": (
@@ -115,17 +115,21 @@ def goal_instructions(
     seed: int,
     count: int = 6,
     held_out: bool = False,
+    joined: bool = False,
 ) -> tuple[str, ...]:
     """Return up to ``count`` different English instructions for one literal.
 
     ``words`` maps all objects in the scene to their language: an ambiguous name is used only if no name distinguishes the
-    object. ``held_out``: use only the template that is otherwise never used. Deterministic for equal arguments. Raises
-    UsageError for a predicate without templates.
+    object. ``held_out``: use only the template that is otherwise never used. ``joined``: use only imperative templates, which can
+    follow ``and then``; a statement (``{a} should be on {b}``) cannot. Deterministic for equal arguments. Raises UsageError for a
+    predicate without templates.
     """
     if literal.predicate not in TEMPLATES:
         raise UsageError(f"no instructions for {literal.predicate!r}; there are some for {', '.join(TEMPLATES)}")
     templates = TEMPLATES[literal.predicate]
     templates = templates[-1:] if held_out else templates[:-1]
+    if joined:
+        templates = tuple(each for each in templates if not each.startswith("{"))
     subjects = _names(literal.subject, words)
     seconds = [None] if literal.second not in words else _names(str(literal.second), words)  # fixtures have no names
     rng = np.random.default_rng(seed)
@@ -154,7 +158,6 @@ def _filled(template: str, subject: Name, second: Name | None) -> str:
         it="them" if subject.plural else "it",
         they="they" if subject.plural else "it",
         are="are" if subject.plural else "is",
-        have="have" if subject.plural else "has",
         point="point" if subject.plural else "points",
         its="their" if subject.plural else "its",
         it_b="them" if second is not None and second.plural else "it",

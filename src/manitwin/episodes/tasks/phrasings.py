@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
-from manitwin.episodes.goals.goal import Goal, Literal
+from manitwin.episodes.goals.goal import Goal
 from manitwin.episodes.goals.goal_instructions import goal_instructions
 from manitwin.twin.record import Language
 
@@ -17,13 +18,12 @@ def task_instructions(
     goal: Goal, words: Mapping[str, Language], *, seed: int
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return instructions and held-out instructions, which share no template; raises UsageError without a template."""
-    told = [_of(literal, words, seed + place, COUNT, held_out=False) for place, literal in enumerate(goal.literals)]
-    held = [_of(literal, words, seed + place, HELD_OUT, held_out=True) for place, literal in enumerate(goal.literals)]
+    told, held = [], []
+    for place, literal in enumerate(goal.literals):
+        of = partial(goal_instructions, literal, words, seed=seed + place, joined=len(goal.literals) > 1)
+        told.append(of(count=COUNT))
+        held.append(of(count=HELD_OUT, held_out=True))
     return _joined(told, JOINTS), _joined(held, HELD_OUT_JOINTS)
-
-
-def _of(literal: Literal, words: Mapping[str, Language], seed: int, count: int, *, held_out: bool) -> tuple[str, ...]:
-    return goal_instructions(literal, words, seed=seed, count=count, held_out=held_out)
 
 
 def _joined(each: Sequence[Sequence[str]], joints: Sequence[str]) -> tuple[str, ...]:

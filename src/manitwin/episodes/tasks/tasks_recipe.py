@@ -69,7 +69,7 @@ class TasksStage:
     """Stage that samples the tasks of a scene."""
 
     name = "tasks"
-    version = "9"
+    version = "10"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (TASKS, COUNTS)
     needs: Resource = "cpu"

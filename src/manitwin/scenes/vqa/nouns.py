@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from functools import cache
 
 from manitwin.models.annotators import prior_names
@@ -34,6 +35,20 @@ def noun_of(category: str) -> str:
     if category in OF_ANOTHER_KIND:
         return category
     return _WHAT_FOLLOWS.split(category.removeprefix("pair of "), maxsplit=1)[0].split()[-1]
+
+
+def names_cut_down(names: Iterable[str]) -> frozenset[str]:
+    """Return names with all shorter ones that people say for them: ``measuring cup`` and ``cup``; ``jar of honey`` and ``jar``.
+
+    What its last word would make another kind of thing stays whole: a magnifying glass is no glass.
+    """
+    found = set(names)
+    for name in names:
+        head = _WHAT_FOLLOWS.split(name.removeprefix("pair of "), maxsplit=1)[0]
+        words = head.split()
+        if head not in OF_ANOTHER_KIND:
+            found |= {" ".join(words[start:]) for start in range(len(words))}
+    return frozenset(found)
 
 
 def words_of(category: str) -> frozenset[str]:
