@@ -55,7 +55,7 @@ class EpisodesStage:
     """Makes the episodes of a batch; each has its own generator, seeded by the run's seed and the episode's number."""
 
     name = "episodes"
-    version = "18"
+    version = "19"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (EPISODES, ATTEMPTS, "batch")
     needs: Resource = "cpu"

@@ -80,6 +80,12 @@ def tells_apart(language: Language, others: Sequence[Language]) -> bool:
     return any(not any(_fits(name, told, other) for other in beside) for name in _names(told))
 
 
+def called(category: str) -> frozenset[str]:
+    """Return what people may call a thing of a category: its name, those that the priors know for it, and what these end with."""
+    prior = lookup(category)
+    return names_cut_down((category, *(prior.aliases if prior is not None else ())))
+
+
 def _names(told: _Told) -> list[Name]:
     ways: list[tuple[str | None, tuple[str, ...]]] = [
         (told.noun, ()),
@@ -129,7 +135,7 @@ def _told(language: Language) -> _Told:
     edible = prior is not None and prior.surface == "food skin"
     return _Told(
         noun=noun,
-        nouns=names_cut_down((category, *(prior.aliases if prior is not None else ()))),
+        nouns=called(category),
         plural=plural,
         in_pairs=in_pairs,
         color=_color(language.color),

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.episodes.fixtures import Fixture
+from manitwin.episodes.goals.goal_instructions import tells_fixture
 from manitwin.episodes.pick_place_tasks import (
     PickPlaceTask,
     Placeable,
@@ -78,6 +79,8 @@ def table_setting(
         if objects is None:
             return None
         around = Surroundings(objects, pool, area, tuple(furniture_boxes(furniture)))
+        if not _tells_fixture(skill, around, 0):
+            continue
         found = skill.set_goal(around, 0, 1 if skill.has_partner else None, rng)
         if found is not None:
             return Setting(PickPlaceTask(objects, 0, found.poses[0]), furniture, ambient, lights, None, found)
@@ -116,6 +119,8 @@ def scene_setting(
                 return Setting(task, record.furniture, record.ambient, record.lights, scene.record.scene_id)
             continue
         around = Surroundings(objects, pool(), area, boxes)
+        if not _tells_fixture(skill, around, target):
+            continue
         for partner in _partners(skill, around, target, rng):
             found = skill.set_goal(around, target, partner, rng)
             if found is not None:
@@ -142,6 +147,11 @@ def _taking_part(
         if partner.twin_id != target.twin_id and skill.suits(pool, target, partner):
             return [first, placeable(partner)]
     return None
+
+
+def _tells_fixture(skill: Skill, around: Surroundings, target: int) -> bool:
+    others = (around.twin(number).category for number in range(len(around.objects)) if number != target)
+    return tells_fixture(skill.predicate, others)
 
 
 def _partners(skill: Skill, around: Surroundings, target: int, rng: np.random.Generator) -> Sequence[int | None]:

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from manitwin.episodes.goals.goal import Goal, Literal
-from manitwin.episodes.goals.goal_instructions import TEMPLATES, goal_instructions
+from manitwin.episodes.goals.goal import SIGNATURES, Goal, Literal
+from manitwin.episodes.goals.goal_instructions import FIXTURES, TEMPLATES, goal_instructions, tells_fixture
 from manitwin.episodes.tasks.phrasings import task_instructions
 from manitwin.twin.record import Language
 
@@ -70,3 +70,22 @@ def test_a_statement_is_not_joined_to_another_instruction() -> None:
         assert len(spoken) >= 3 and held_out
         for each in (*spoken, *held_out):
             assert not re.search(r"(?:^first|, then|, and then|, and after that|^) ?the ", each), each
+
+
+@pytest.mark.parametrize(
+    ("predicate", "other"),
+    [("wiped", "cutting board"), ("inserted", "pen holder"), ("hung", "coat hook"), ("struck", "block of wood")],
+)
+def test_a_fixture_that_an_object_may_be_called_is_not_told_from_it(predicate: str, other: str) -> None:
+    assert not tells_fixture(predicate, ["mug", other])
+    assert tells_fixture(predicate, ["mug", "marker", "circuit board"])
+    assert tells_fixture("lifted", ["mug", other])
+
+
+def test_what_the_templates_call_fixtures_is_what_is_looked_for() -> None:
+    of_fixtures = {name for name, signature in SIGNATURES.items() if signature.second in ("fixture", "place")}
+    assert (of_fixtures | {"struck"}) == set(FIXTURES)
+    for predicate, nouns in FIXTURES.items():
+        for template in TEMPLATES[predicate]:
+            said = {noun for noun in nouns if re.search(rf"\b{noun}(?:ed)?\b", template)}
+            assert said or template == "hang up {a}", template

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 
 import numpy as np
 
 from manitwin.episodes.goals.goal import Literal
-from manitwin.episodes.naming import Name, names_of
+from manitwin.episodes.naming import Name, called, names_of
 from manitwin.errors import UsageError
+from manitwin.models.annotators.prior_names import normalised
 from manitwin.twin.record import Language
 
 TEMPLATES: Mapping[str, tuple[str, ...]] = {
@@ -106,6 +107,25 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 """Templates of each predicate; the last one of each is held out for tests of policies (``held_out``)."""
+
+FIXTURES: Mapping[str, frozenset[str]] = {
+    "hung": frozenset({"peg", "hook"}),
+    "inserted": frozenset({"holder"}),
+    "struck": frozenset({"block"}),
+    "wiped": frozenset({"board"}),
+    "cut_motion": frozenset({"board"}),
+    "pushed_to": frozenset({"mark"}),
+}
+"""What the templates call the things that stand there for a goal and are none of the objects."""
+
+
+def tells_fixture(predicate: str, others: Iterable[str]) -> bool:
+    """Tell whether what a goal's words call its fixture is none of the other objects, by their categories.
+
+    Beside a cutting board nobody knows which one "the board" is, nor beside a pen holder "the holder".
+    """
+    nouns = FIXTURES.get(predicate, frozenset())
+    return not any(nouns & called(normalised(category)) for category in others)
 
 
 def goal_instructions(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from manitwin.episodes.goals.evaluation import evaluate
 from manitwin.episodes.goals.goal import Goal, Literal
+from manitwin.episodes.goals.goal_instructions import tells_fixture
 from manitwin.episodes.naming import tells_apart
 from manitwin.episodes.skills.hands import skills_of
 from manitwin.episodes.tasks.task_record import kind_of
@@ -70,7 +71,8 @@ def single_actions(scene: TaskScene, dropped: Counter[str]) -> list[Action]:
                 key = str(goal.literals[0])
                 if key in found:
                     continue  # the same goal by another skill
-                if {target, partner} & unnamed:
+                others = [twin.category for number, twin in enumerate(twins) if number != target]
+                if {target, partner} & unnamed or not tells_fixture(skill.predicate, others):
                     dropped["ambiguous_name"] += 1
                 elif _is_true_already(scene, goal):
                     dropped["true_already"] += 1

@@ -69,7 +69,7 @@ class TasksStage:
     """Stage that samples the tasks of a scene."""
 
     name = "tasks"
-    version = "10"
+    version = "11"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (TASKS, COUNTS)
     needs: Resource = "cpu"
