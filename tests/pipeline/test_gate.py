@@ -151,8 +151,28 @@ def test_four_things_side_by_side_are_rejected_with_their_number(tmp_path: Path)
 
 
 def test_specks_are_told_and_do_not_reject(tmp_path: Path) -> None:
-    checks = _gate(_draft(tmp_path, trimesh.util.concatenate([_box(), _box(0.1, side=0.002)])), tmp_path)
+    hollow = trimesh.creation.annulus(r_min=0.02, r_max=0.04, height=0.03)
+    speck = _box(side=0.002).apply_translation((0.037, 0.037, 0.0))  # within the corner of its box
+    checks = _gate(_draft(tmp_path, trimesh.util.concatenate([hollow, speck])), tmp_path)
     assert checks["single_object"]["passed"] and checks["single_object"]["message"] == "1 small parts float apart"
+
+
+def test_small_parts_that_make_a_thing_longer_are_rejected(tmp_path: Path) -> None:
+    tray = trimesh.creation.box((0.14, 0.04, 0.02))
+    pegs = [_box(side=0.004).apply_translation((0.09, y, -0.008)) for y in (-0.01, 0.0, 0.01)]
+    rejection = _rejection(_draft(tmp_path, trimesh.util.concatenate([tray, *pegs])), tmp_path)
+    assert rejection.reason == "several_objects"
+    assert rejection.detail.startswith(
+        "3 small parts float apart from it, so that it is 0.162 m from end to end and not 0.14 m"
+    )
+
+
+def test_a_plate_of_pieces_each_of_which_is_small_is_several_objects(tmp_path: Path) -> None:
+    pieces = [
+        _box(0.03 * column, side=0.01).apply_translation((0, 0.03 * row, 0)) for column in range(5) for row in range(5)
+    ]
+    rejection = _rejection(_draft(tmp_path, trimesh.util.concatenate(pieces)), tmp_path)
+    assert rejection.reason == "several_objects" and rejection.detail.startswith("25 separate objects")
 
 
 def test_eye_sees_the_subject_and_its_no_rejects(tmp_path: Path) -> None:

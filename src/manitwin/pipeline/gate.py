@@ -162,11 +162,24 @@ def check_plausible_size(
 def check_single_object(
     solid: trimesh.Trimesh, gap_share: float, object_share: float, rng: np.random.Generator
 ) -> Check:
-    """Check that all large parts touch, nearly touch or enclose each other. Raises Rejected ``several_objects``."""
+    """Check that all large parts touch, nearly touch or enclose each other; raises Rejected several_objects.
+
+    So it does for small parts that float so far apart that they change how large the thing is, and what it rests on: pegs that
+    are printed along with a tray, crumbs of a scan.
+    """
     gap_m = gap_share * float(np.linalg.norm(np.ptp(solid.vertices, axis=0)))
     found = separate_objects(solid, gap_m=gap_m, object_share=object_share, rng=rng)
     if found.count > 1:
         detail = f"{found.count} separate objects, more than {gap_m:.3g} m apart; give each object in a file of its own"
+        raise Rejected("several_objects", detail, "gate")
+    farthest = int(np.argmax(found.larger_m))
+    if found.larger_m[farthest] > gap_m:
+        side_m = float(np.ptp(solid.vertices, axis=0)[farthest])
+        parts = "1 small part floats" if found.specks == 1 else f"{found.specks} small parts float"
+        detail = (
+            f"{parts} apart from it, so that it is {side_m:.3g} m from end to end and not"
+            f" {side_m - found.larger_m[farthest]:.3g} m; delete what is not of it, and join what is, in a modeller"
+        )
         raise Rejected("several_objects", detail, "gate")
     message = f"{found.specks} small parts float apart" if found.specks else ""
     return Check(name="single_object", passed=True, value=float(found.count), limit=1.0, message=message)

@@ -41,7 +41,9 @@ def test_floating_crumbs_are_specks_and_no_objects() -> None:
         trimesh.creation.icosphere(subdivisions=1, radius=0.001).apply_translation((0.05, y, 0))
         for y in (0, 0.01, 0.02)
     ]
-    assert _count(_box(0), *crumbs) == SeparateObjects(1, 3)
+    found = _count(_box(0), *crumbs)
+    assert (found.count, found.specks) == (1, 3)
+    assert found.larger_m == pytest.approx((0.031, 0.001, 0.0), abs=1e-3)
 
 
 def test_chain_of_parts_that_touch_is_one_object() -> None:

@@ -32,10 +32,14 @@ class Part:
 
 @dataclass(frozen=True)
 class SeparateObjects:
-    """The number of separate objects, and of parts too small to be objects."""
+    """The number of objects that stand apart from each other, and of parts that are too small to be one.
+
+    ``larger_m (3,)`` is by how much the specks that float apart make the box along the axes larger than that of the objects.
+    """
 
     count: int
     specks: int
+    larger_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def connected_parts(mesh: trimesh.Trimesh) -> list[Part]:
@@ -59,9 +63,9 @@ def separate_objects(
 ) -> SeparateObjects:
     """Count the separate objects in a mesh.
 
-    Parts belong to one object if they touch, come within ``gap_m`` of each other, or lie mostly inside one another's convex
-    hull (pads of a headset, screws, a lid over a pot). A group with less than ``object_share`` of the summed area and of the
-    summed hull volumes counts as specks.
+    Parts that touch, come within ``gap_m`` of each other, or lie mostly within one another's convex hull are one thing
+    (pads of a headset, screws, a lid over a pot). A group with less than ``object_share`` of the summed area and of
+    the summed hull volumes is no thing but specks; where all groups are so small, each is a thing (a plate of game pieces).
     """
     every = connected_parts(mesh)
     parts = sorted(every, key=lambda part: -part.share)[:_MOST_PARTS]
@@ -70,10 +74,19 @@ def separate_objects(
         max(sum(parts[i].area_share for i in group), sum(parts[i].hull_volume_share for i in group)) >= object_share
         for group in groups
     ]
-    specks = (
-        len(every) - len(parts) + sum(len(group) for group, thing in zip(groups, is_thing, strict=True) if not thing)
-    )
-    return SeparateObjects(max(sum(is_thing), 1), specks)
+    if not any(is_thing):
+        is_thing = [True] * len(groups)
+    crumbs = [i for group, thing in zip(groups, is_thing, strict=True) if not thing for i in group]
+    things = [i for group, thing in zip(groups, is_thing, strict=True) if thing for i in group]
+    larger_m = _box(mesh, parts, things + crumbs) - _box(mesh, parts, things)
+    x, y, z = larger_m.tolist()
+    return SeparateObjects(sum(is_thing), len(every) - len(parts) + len(crumbs), (x, y, z))
+
+
+def _box(mesh: trimesh.Trimesh, parts: list[Part], chosen: list[int]) -> np.ndarray:
+    """Return the sides ``(3,)`` of the box along the axes around some of the parts."""
+    faces = np.concatenate([parts[i].faces for i in chosen])
+    return np.asarray(np.ptp(mesh.vertices[mesh.faces[faces].ravel()], axis=0))
 
 
 def _groups(mesh: trimesh.Trimesh, parts: list[Part], gap_m: float, rng: np.random.Generator) -> list[list[int]]:
