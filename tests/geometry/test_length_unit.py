@@ -26,6 +26,9 @@ from manitwin.geometry.length_unit import decide_unit
         (0.7, {"expected_m": (0.08, 0.13)}, 1.0, False, "unknown"),
         (60.0, {"file_format": "stl"}, 0.001, True, "guessed"),  # 60 cm would fit, but STL is in millimetres
         (60.0, {"file_format": "obj"}, 0.001, False, "guessed"),
+        (35.0, {"file_format": "stl"}, 0.001, True, "guessed"),  # a printed part, as small as many are
+        (35.0, {"file_format": "obj"}, 0.001, False, "guessed"),
+        (600.0, {"file_format": "stl"}, 0.001, True, "guessed"),  # larger than any printer's bed
         (9.5, {"file_format": "stl"}, 0.001, False, "guessed"),
         (
             48.0,

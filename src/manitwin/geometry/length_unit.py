@@ -21,10 +21,11 @@ _SHARES = {"millimetres": 0.5, "centimetres": 0.35, "inches": 0.1}
 _STL_SHARES = {"millimetres": 0.85, "centimetres": 0.05, "inches": 0.05}
 _NO_UNIT_SHARE = 0.05  # furniture in metres, and meshes without scale
 _SURE = 0.9
-_ANYTHING_M = (0.02, 0.6)  # the usual longest axis of an unnamed object
-_OTHER_SIZE_SHARE = 0.1  # toys, samples and oversized specimens
-_DEVIATIONS_ACROSS = 3.29  # standard deviations across an interval that contains nine of ten
-_NORMALISED = (1.0, 2.0)  # longest axis of meshes normalized to a unit cube by a generator or viewer
+_ANYTHING_M = (0.02, 0.6)  # the usual longest axis of a thing that nobody has named
+_PRINTED_M = (0.01, 0.3)  # that of what fits the beds of printers, 20 to 35 cm wide, for which most STL is written
+_OTHER_SIZE_SHARE = 0.1  # toys, samples and giants of a kind
+_DEVIATIONS_ACROSS = 3.29  # a usual interval holds nine of ten
+_NORMALISED = (1.0, 2.0)  # the longest axis of meshes that a generator or a viewer scaled to a unit cube
 _MADE_TO_SIZE = frozenset({"step", "3mf"})
 """Design formats, whose unit is part of the design and which viewers do not rescale."""
 _CHOICE_OF_UNIT = frozenset({"dae", "fbx", "usdz"})
@@ -95,20 +96,31 @@ def _guessed(
         # kept unchanged, so that the gate rejects the size
         source: Literal["declared", "assumed"] = "declared" if declared else "assumed"
         return LengthUnit(factor, True, source, f"{said}, and no usual unit makes that plausible; give --units")
-    shares = _STL_SHARES if file_format == "stl" else _SHARES
-    weights = {n: shares[n] * _density(longest_axis * u, expected_m or _ANYTHING_M) for n, u in fitting.items()}
-    best = max(weights, key=lambda name: weights[name])
+    is_stl = file_format == "stl"
+    kinds = [expected_m] if expected_m is not None else [_ANYTHING_M, _PRINTED_M] if is_stl else [_ANYTHING_M]
+    sure = [name for kind in kinds if (name := _sure_unit(longest_axis, fitting, kind, is_stl)) is not None]
     # A declared unit that is implausible is not evidence for another unit: the file may have no scale, or be large.
     contradicts = declared and file_format in _CHOICE_OF_UNIT and expected_m is None
-    if not contradicts and weights[best] >= _SURE * (sum(weights.values()) + _NO_UNIT_SHARE * _any_density()):
-        finding = f"{said}, which is implausible; read as {best}: {longest_axis * fitting[best]:.3g} m"
-        return LengthUnit(fitting[best], True, "guessed", finding)
+    if not contradicts and sure:
+        finding = f"{said}, which is implausible; read as {sure[0]}: {longest_axis * fitting[sure[0]]:.3g} m"
+        return LengthUnit(fitting[sure[0]], True, "guessed", finding)
     usual = {
         n: u for n, u in fitting.items() if expected_m is not None and _usual(longest_axis * u, expected_m)
     } or fitting
     may = f"{', '.join(usual)} would {'all fit' if len(usual) > 1 else 'fit, as would no unit at all'}"
     finding = f"{said}, which is implausible; {may}: its scale was not believed; give --units"
     return LengthUnit(next(iter(usual.values())), False, "guessed", finding)
+
+
+def _sure_unit(
+    longest_axis: float, fitting: dict[str, float], usual_m: tuple[float, float], is_stl: bool
+) -> str | None:
+    """Return the unit for which nine tenths speak, of a thing with the usual longest axis ``usual_m``; None where none is."""
+    shares = _STL_SHARES if is_stl else _SHARES
+    weights = {name: shares[name] * _density(longest_axis * unit_m, usual_m) for name, unit_m in fitting.items()}
+    best = max(weights, key=lambda name: weights[name])
+    enough = weights[best] >= _SURE * (sum(weights.values()) + _NO_UNIT_SHARE * _any_density())
+    return best if enough else None
 
 
 def _not_believed(factor: float, cause: str) -> LengthUnit:

@@ -50,7 +50,7 @@ class MeshStage:
     settings: MeshConfig
 
     name: ClassVar[str] = "mesh"
-    version: ClassVar[str] = "20"
+    version: ClassVar[str] = "21"
     reads: ClassVar[tuple[str, ...]] = (f"{_GENERATED}?", "generation?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry")
     needs: ClassVar[Resource] = "cpu"
