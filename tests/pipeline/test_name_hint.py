@@ -15,6 +15,7 @@ from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID, unsaid_size_word
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.recipe import ending_of
 from manitwin.pipeline.size_remarks import CHECK_SCALE
+from manitwin.pipeline.suspicious_size import usual_size_checks
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.record import REJECTION_REASONS, TwinRecord
 from manitwin.twin.store import RECORD, parse_record
@@ -159,3 +160,6 @@ def test_a_suspicious_scale_is_named_first(name: str | None, longest_m: float, s
         assert told.detail.endswith(f"{CHECK_SCALE}; none of 12 simulated grasps held: 12 drops")
     other = _rejection(Rejected("no_stable_pose", "so"), "placement", draft)
     assert other.detail == "so"
+    checks = usual_size_checks(draft)
+    assert [check.passed for check in checks] == [False] * (said is not None), "nor is it accepted in silence"
+    assert all(check.name == "usual_size" and check.message.startswith(said or "") for check in checks)

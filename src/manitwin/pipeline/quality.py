@@ -11,6 +11,7 @@ from manitwin.formats.printable import printable_line
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.guesses import OF_NO_NAME, naming_checks, shape_checks, size_checks, template_checks
 from manitwin.pipeline.photo_thinning import thinned_words
+from manitwin.pipeline.suspicious_size import usual_size_checks
 from manitwin.twin.import_record import read_import_record
 from manitwin.twin.record_values import Check
 from manitwin.twin.shares import wilson_interval
@@ -54,6 +55,7 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
             )
         )
     checks += size_checks(draft)
+    checks += usual_size_checks(draft)
     checks += _unseen(draft)
     checks += template_checks(draft)
     checks += shape_checks(draft)

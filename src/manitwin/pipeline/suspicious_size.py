@@ -1,4 +1,4 @@
-"""Declared sizes that are unusual for the object, which are reported first if grasps fail, as they explain the failure."""
+"""A size that a mesh declares and such things do not have: said first where grasps fail, and a finding where they hold."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from manitwin.models.annotators.prior_names import found_by, word_for
 from manitwin.models.annotators.priors import unknown_prior
 from manitwin.pipeline.object_state import object_name
 from manitwin.pipeline.size_remarks import CHECK_SCALE
+from manitwin.twin.record_values import Check
 
 FACTORS = {
     1000.0: "metres taken for millimetres", 100.0: "metres taken for centimetres", 10.0: "centimetres taken for millimetres",
@@ -41,6 +42,16 @@ def suspicious_size_words(draft: Draft[Any]) -> str | None:
         (f" ({said}?)" for factor, said in FACTORS.items() if usual.low <= factor * longest_m <= usual.high), ""
     )
     return f"it is {_mm(longest_m)} long, but {such} {_mm(usual.low)} to {_mm(usual.high)}{mixed}: {CHECK_SCALE}"
+
+
+def usual_size_checks(draft: Draft[Any]) -> list[Check]:
+    """Return the failed check of a size that such things do not have; none where it is theirs, or was estimated."""
+    words = suspicious_size_words(draft)
+    if words is None:
+        return []
+    return [
+        Check(name="usual_size", passed=False, value=float(max(draft.field("physical")["extents_m"])), message=words)
+    ]
 
 
 def _mm(length_m: float) -> str:
