@@ -140,7 +140,7 @@ def test_standard_sizes_are_in_the_intervals(name: str) -> None:
         ("cylinder", "geometric solid"),
         ("custard cup", "ramekin"), ("wine bottle rack", "wine rack"), ("toy elephant", "toy"), ("plush owl", "stuffed toy"),
         ("shovel", "shovel"), ("hand shovel", "trowel"), ("toy shovel", "sand toy"),
-        ("broom", "broom"), ("hand brush", "hand broom"),
+        ("broom", "broom"), ("hand brush", "hand broom"), ("foam roller", "foam roller"), ("yoga brick", "yoga block"),
     ],
 )  # fmt: skip
 def test_lookup_understands_what_people_say(said: str, category: str) -> None:
