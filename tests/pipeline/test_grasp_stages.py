@@ -218,6 +218,14 @@ def test_a_cube_as_wide_as_the_hand_opens_is_too_wide(tmp_path: Path) -> None:
     assert answer.value.reason == "too_wide"
 
 
+def test_a_cube_hardly_narrower_than_the_hand_opens_is_told_what_has_to_stay_free(tmp_path: Path) -> None:
+    draft = box_draft(tmp_path, [0.0795, 0.0795, 0.0795], [[0.03975, 0, 0.04], [0, 0.03975, 0.04]])
+    said = r"narrowest grip is 79\.5 mm, the panda opens 80 mm, of which 0\.5 mm beside each pad stay free"
+    with pytest.raises(Rejected, match=said) as answer:
+        run_grasps(draft, tmp_path)
+    assert answer.value.reason == "too_wide"
+
+
 def test_foil_is_rejected_as_too_thin(tmp_path: Path) -> None:
     draft = box_draft(tmp_path, [0.1, 0.12, 0.0003], [[0.05, 0, 0], [0, 0.06, 0]])
     with pytest.raises(Rejected) as answer:

@@ -51,7 +51,7 @@ class GraspsStage:
     the object; any other gripper writes no proposals and the reason.
     """
 
-    version = "11"
+    version = "12"
     reads: tuple[str, ...] = (
         "solid.npz",
         "hulls.npz",

@@ -92,7 +92,8 @@ class PadScreen:
         gripper = f"the {self._gripper.name} opens {opening_m * 1000:.0f} mm"
         room_m = opening_m - 2 * CLEARANCE_M
         if least > room_m:
-            return Rejected("too_wide", f"narrowest grip is {least * 1000:.1f} mm, {gripper}")
+            nearly = f", of which {CLEARANCE_M * 1000:g} mm beside each pad stay free" if least < opening_m else ""
+            return Rejected("too_wide", f"narrowest grip is {least * 1000:.1f} mm, {gripper}{nearly}")
         wide = square.width_m[square.width_m > room_m]
         if len(wide) > MOSTLY * len(square) and not counts.get("after_collision"):
             narrower = f"no hand reaches the {least * 1000:.1f} mm and more of a rim or edge"
