@@ -12,6 +12,7 @@ from manitwin.models.annotators.diacritics import without_diacritics
 from manitwin.models.annotators.names_abroad import category_abroad
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
+from manitwin.models.generators.templates.looks import COLORS, MATERIALS, SAID_OF, SHADES
 
 _BETWEEN_WORDS = r"(?:[^a-z0-9&+'.]|\.(?!\d)|(?<!\d)\.)+"
 """Word separators; a point between two digits is part of a number: 1.5 cm."""
@@ -92,18 +93,48 @@ _TOO_LARGE = "furniture"
 """Domain of objects that are too large for a hand, so that a toy version is a toy."""
 
 
-def found_by(name: str | None) -> tuple[Prior, str] | None:
-    """Find the prior of an everyday name, and the words, in the singular, by which it was found.
+_ALONE = frozenset({"cap", "handle", "holder", "roller"})
+"""Nouns that name a thing where they stand alone, or with words for its look: with another noun they are a part of that thing,
+or made for it (the cap of a pen or a chair's leg, the holder of a cable), of any size, and no hat and no container."""
+_OF_ITS_LOOK = frozenset(
+    word for said in (*COLORS, *SHADES, *MATERIALS, *SAID_OF, "metal", "wool") for word in said.split()
+)
+_SAYS_LITTLE = frozenset(
+    {
+        "a", "an", "the", "my", "new", "old", "used", "worn", "simple", "plain", "basic", "modern", "vintage", "classic",
+        "cheap", "round", "square", "oval", "flat", "long", "short", "big", "little", "tiny", "huge", "tall", "low", "wide",
+        "narrow", "thick", "thin", "wooden", "woolen", "woollen", "metallic", "printed", "3d",
+    }
+)  # fmt: skip
+_JOINED = r" (?:made |full )?(of|with|for|in|on|without|no|from) "
+"""What divides a name into the noun with what stands before it, and what is said of that."""
 
-    The attempts, in order: the whole name or an alias; the part before 'of', 'with', 'without', 'no', 'for', 'in', 'on' or
-    'from'; the whole name again. Each is tried as it is, in the singular, and with words dropped from the front ('red coffee
-    mugs' are coffee mugs, which are mugs); before its last word is tried alone, words in between are dropped ('lego duplo
-    brick' is a lego brick). The last word decides: a mug rack is not a mug. Spelling with or without spaces is equivalent: a
-    'waterbottle' is a water bottle, and a 'tooth brush' a toothbrush rather than a brush. If nothing is found, numbers,
-    measures, colours and common package words at the end are ignored ('mug_1', 'cube 5 cm', 'pitcher blue' and 'juice smooth
-    500 ml' are a mug, a cube, a pitcher and juice), and a toy version of anything is a toy, as is a doll's chair. File names
-    are never looked up, since they are not evidence. A name without an English match is looked up as a whole in other
-    languages.
+
+def _is_of_another(phrase: str, noun: str) -> bool:
+    """Tell whether a name with a noun of ``_ALONE`` says what else it is of: a 'red bottle cap', the 'handle of a drawer'."""
+    if noun not in _ALONE:
+        return False
+    head, *said = re.split(_JOINED, phrase, maxsplit=1)
+    others = [word for word in head.split() if noun not in singulars(word)]
+    if said and said[0] in ("of", "for", "from"):
+        others += said[1].split()
+    return any(
+        word not in _OF_ITS_LOOK and word not in _SAYS_LITTLE and not _NO_THING.fullmatch(word) for word in others
+    )
+
+
+def found_by(name: str | None) -> tuple[Prior, str] | None:
+    """Find the prior of what a person calls a thing, and the words, in the singular, by which it is found.
+
+    Tried in order: the whole name, or an alias of it; the part before 'of', 'with', 'without', 'no', 'for', 'in', 'on' or 'from';
+    the whole again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
+    which are mugs), and before its last word stands alone with words dropped between ('lego duplo brick' is a lego brick). The
+    last word decides what a thing is: a mug rack is no mug, but a pen cap is no cap either (``_ALONE``). Words are the same
+    written together or apart: a 'waterbottle' is a water bottle, and a 'tooth brush' a toothbrush before it is a brush. Where
+    none is found, numbers, measures, colours and what is printed on most packs say nothing at the end ('mug_1', 'cube 5 cm',
+    'pitcher blue' and 'juice smooth 500 ml' are a mug, a cube, a pitcher and juice), and what is a toy of anything is a toy, as
+    is a doll's chair. File names are never looked up: they are not evidence. What English has no such thing for, and is the
+    whole name of one in another language, is that.
     """
     return (_found_in_english(name) or _found_abroad(name)) if name else None
 
@@ -117,7 +148,7 @@ def _found_in_english(name: str) -> tuple[Prior, str] | None:
     """Return the prior of an English name, with the attempts in the order that ``found_by`` describes."""
     if not (phrase := normalised(name)):
         return None
-    head = re.split(r" (?:made |full )?(?:of|with|for|in|on|without|no|from) ", phrase, maxsplit=1)[0].split()
+    head = re.split(_JOINED, phrase, maxsplit=1)[0].split()
     words = phrase.split()
     tries = [words, *(head[i:] for i in range(len(head) - 1)), *_words_dropped(head), head[-1:]]
     tries += [words[i:] for i in range(1, len(words))]
@@ -128,10 +159,14 @@ def _found_in_english(name: str) -> tuple[Prior, str] | None:
     for part in tries:
         spelt = list(singulars(" ".join(part)))
         for candidate in (*spelt, *(together.get(each.replace(" ", ""), "") for each in spelt)):
+            if of_another := _is_of_another(phrase, candidate):
+                break
             if candidate in index and index[candidate].category != "unknown":
                 small = index[candidate].domain == _TOO_LARGE and not _SMALL.isdisjoint(head[:-1])
                 return (index["toy"], " ".join(head)) if small else (index[candidate], candidate)
-    if ":" in name:  # the text before a colon names a collection: 'Practice: hand wheel valve'
+        if of_another:
+            break
+    if ":" in name:  # then what stands before it is a collection: 'Practice: hand wheel valve'
         behind = found_by(name.rpartition(":")[2])
         if behind is not None:
             return behind
