@@ -20,7 +20,7 @@ class CaptionStage:
     """Get the object's descriptions from the annotator. Field: ``language``."""
 
     name: ClassVar[str] = "caption"
-    version: ClassVar[str] = "22"
+    version: ClassVar[str] = "23"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb",
         "solid.npz",

@@ -24,7 +24,7 @@ class GenerateStage:
     """Generate a mesh from the photo or text. Writes ``generated.glb`` and the field ``generation``."""
 
     name: ClassVar[str] = "generate"
-    version: ClassVar[str] = "48"
+    version: ClassVar[str] = "49"
     reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "matte?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 

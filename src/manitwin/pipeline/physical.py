@@ -47,7 +47,7 @@ class PhysicalStage:
     """Estimate size, mass and friction, scale the object, and compute the mass properties of its shape."""
 
     name: ClassVar[str] = "physical"
-    version: ClassVar[str] = "26"
+    version: ClassVar[str] = "27"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/", "cameras", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "physical_findings", "size", "called")
 

@@ -39,7 +39,7 @@ class PointsStage:
     """
 
     name: ClassVar[str] = "points"
-    version: ClassVar[str] = "33"
+    version: ClassVar[str] = "34"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "views/", "marked/", "physical", "size", "language", "candidates", "visible_candidates",
         "cameras", "geometry?", "naming?",
