@@ -92,6 +92,14 @@ def test_the_result_line_says_it(tmp_path: Path) -> None:
     assert named.detail_and_hint == named.detail and "--name" not in named.detail_and_hint
 
 
+def test_the_result_line_says_that_such_things_are_of_another_size(tmp_path: Path) -> None:
+    folder = tmp_path / twin_name(write_accepted(tmp_path, 1))
+    message = f"it is 403 mm long, but nearly every fork has 130 mm to 220 mm: {CHECK_SCALE}"
+    checks = [{"name": "usual_size", "passed": False, "message": message}]
+    ending = ending_of(changed(folder, {"name": "fork", "quality": {"checks": checks}}))
+    assert ending.detail_and_hint == f"{ending.detail}; {message}"
+
+
 @pytest.mark.parametrize(
     ("name", "told"),
     [

@@ -43,6 +43,7 @@ from manitwin.pipeline.record_grasps import RecordGraspsStage
 from manitwin.pipeline.robustness import RobustnessStage
 from manitwin.pipeline.second_opinion import SecondOpinionStage
 from manitwin.pipeline.stage_order import place_in_pipeline
+from manitwin.pipeline.suspicious_size import unusual_size_hint
 from manitwin.pipeline.verify import VerifyStage
 from manitwin.pipeline.views import ViewsStage
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
@@ -328,7 +329,8 @@ def ending_of(record: TwinRecord) -> Ending:
         detail += f"; taken as a {meant}"
     if record.provenance.rehearsed:
         detail += "; a rehearsal"
-    return Ending(record.status, record.revision, reason, detail, name_hint(record))
+    hints = [hint for hint in (unusual_size_hint(record), name_hint(record)) if hint is not None]
+    return Ending(record.status, record.revision, reason, detail, "; ".join(hints) or None)
 
 
 def _taken_as(record: TwinRecord) -> str | None:

@@ -9,6 +9,7 @@ from manitwin.models.annotators.prior_names import found_by, word_for
 from manitwin.models.annotators.priors import unknown_prior
 from manitwin.pipeline.object_state import object_name
 from manitwin.pipeline.size_remarks import CHECK_SCALE
+from manitwin.twin.record import TwinRecord
 from manitwin.twin.record_values import Check
 
 FACTORS = {
@@ -18,6 +19,7 @@ FACTORS = {
 }  # fmt: skip
 """The true size relative to the declared one, and the mistake."""
 
+_USUAL_SIZE = "usual_size"
 _BEYOND = 1.25
 """Tolerance beyond the usual sizes that no wrong unit would explain."""
 
@@ -52,6 +54,12 @@ def usual_size_checks(draft: Draft[Any]) -> list[Check]:
     return [
         Check(name="usual_size", passed=False, value=float(max(draft.field("physical")["extents_m"])), message=words)
     ]
+
+
+def unusual_size_hint(record: TwinRecord) -> str | None:
+    """Return what to tell of the size of an accepted twin that such things do not have; None of any other."""
+    checks = record.quality.checks if record.rejection is None else []
+    return next((check.message for check in checks if check.name == _USUAL_SIZE and check.passed is False), None)
 
 
 def _mm(length_m: float) -> str:
