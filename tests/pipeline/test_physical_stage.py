@@ -117,6 +117,13 @@ def test_a_size_that_no_such_thing_has_is_rejected(tmp_path: Path) -> None:
     assert raised.value.reason == "implausible_size"
 
 
+def test_what_is_usually_longer_than_any_hand_holds_is_rejected_where_nobody_says_its_scale(tmp_path: Path) -> None:
+    said = r"1\.25 m is how long such a thing usually is, and no gripper here holds one longer than 1 m"
+    with pytest.raises(Rejected, match=said) as raised:
+        run(cylinder(0.1, 3.0), tmp_path, "broom", metric=False)
+    assert raised.value.reason == "implausible_size"
+
+
 def test_without_a_name_any_size_goes(tmp_path: Path) -> None:
     assert run(cup(0.4, 0.9, 0.03), tmp_path, None).mass_kg.source == "prior:unknown"
 

@@ -43,6 +43,7 @@ class PhysicalConfig(Section):
     """Plausible limits of size, mass and density; the margins are factors that widen the prior's interval."""
 
     size_margin: float = Field(default=2.0, ge=1)
+    max_longest_side_m: float = Field(default=1.0, gt=0)  # of what is scaled; of other things the gate's
     mass_margin: float = Field(default=2.0, ge=1)
     min_density_kg_m3: float = Field(default=2.0, ge=0)  # expanded foam: 10 and more
     max_density_kg_m3: float = Field(default=23_000.0, gt=0)  # osmium: 22,590

@@ -37,6 +37,7 @@ NOMINAL_WALL_M = 0.002
 """The wall thickness of an ordinary bottle or housing, assumed for comparison if it is unknown."""
 
 
+_ROUNDING = 1e-9
 OF_OTHER_MATTER = 1 / 3
 """Uncertainty of the centre of mass by parts, as a share of its distance from that of the uniform solid, if a handle is of an
 unusual material (benchmarks/center_of_mass.py: at most 0.33 for objects with parts of different density).
@@ -47,7 +48,7 @@ class PhysicalStage:
     """Estimate size, mass and friction, scale the object, and compute the mass properties of its shape."""
 
     name: ClassVar[str] = "physical"
-    version: ClassVar[str] = "27"
+    version: ClassVar[str] = "28"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/", "cameras", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "physical_findings", "size", "called")
 
@@ -79,6 +80,8 @@ class PhysicalStage:
         mass = mass_estimate(estimates, float(solid.volume))
         to_check = _to_check(draft, rescaled=scale != 1.0)
         self._check_size(object_name(draft), scale * longest, estimates.longest_axis_m, to_check)
+        if scale != 1.0:
+            self._check_held(scale * longest)
         self._check_mass(None if _known_mass(subject) else object_name(draft), mass, float(solid.volume), to_check)
         parts = [bake_transform(part, np.diag([scale, scale, scale, 1.0])) for part in subject.parts]
         _write_meshes(draft, folder, solid, parts, scale, self.settings.max_texture_size)
@@ -148,6 +151,16 @@ class PhysicalStage:
             raise Rejected(
                 "implausible_size",
                 f"{longest_m:.4g} m long, but {_one(prior)} has {_span(prior.longest_axis_m)} m; {to_check}",
+            )
+
+    def _check_held(self, longest_m: float) -> None:
+        """Raise Rejected for what was scaled beyond any hand, as the gate does for what has that size: a broom, a barbell."""
+        most_m = self.settings.max_longest_side_m
+        if longest_m > most_m * (1 + _ROUNDING):
+            raise Rejected(
+                "implausible_size",
+                f"{longest_m:.3g} m is how long such a thing usually is, and no gripper here holds one longer than {most_m:g} m;"
+                " of a shorter one give the longest side in metres",
             )
 
     def _check_mass(self, name: str | None, mass: Estimate, volume_m3: float, to_check: str) -> None:
