@@ -21,11 +21,11 @@ _SHARES = {"millimetres": 0.5, "centimetres": 0.35, "inches": 0.1}
 _STL_SHARES = {"millimetres": 0.85, "centimetres": 0.05, "inches": 0.05}
 _NO_UNIT_SHARE = 0.05  # furniture in metres, and meshes without scale
 _SURE = 0.9
-_ANYTHING_M = (0.02, 0.6)  # the usual longest axis of a thing that nobody has named
-_PRINTED_M = (0.01, 0.3)  # that of what fits the beds of printers, 20 to 35 cm wide, for which most STL is written
-_OTHER_SIZE_SHARE = 0.1  # toys, samples and giants of a kind
-_DEVIATIONS_ACROSS = 3.29  # a usual interval holds nine of ten
-_NORMALISED = (1.0, 2.0)  # the longest axis of meshes that a generator or a viewer scaled to a unit cube
+_ANYTHING_M = (0.02, 0.6)  # the usual longest axis of an unnamed object
+_PRINTED_M = (0.01, 0.3)  # the same for STL: most are written for 3D printers, whose beds are 20 to 35 cm wide
+_OTHER_SIZE_SHARE = 0.1  # toys, samples and oversized specimens
+_DEVIATIONS_ACROSS = 3.29  # standard deviations across an interval that contains nine of ten
+_NORMALISED = (1.0, 2.0)  # longest axis of meshes normalized to a unit cube by a generator or viewer
 _MADE_TO_SIZE = frozenset({"step", "3mf"})
 """Design formats, whose unit is part of the design and which viewers do not rescale."""
 _CHOICE_OF_UNIT = frozenset({"dae", "fbx", "usdz"})

@@ -162,10 +162,10 @@ def check_plausible_size(
 def check_single_object(
     solid: trimesh.Trimesh, gap_share: float, object_share: float, rng: np.random.Generator
 ) -> Check:
-    """Check that all large parts touch, nearly touch or enclose each other; raises Rejected several_objects.
+    """Check that all large parts touch, nearly touch or enclose each other. Raises Rejected ``several_objects``.
 
-    So it does for small parts that float so far apart that they change how large the thing is, and what it rests on: pegs that
-    are printed along with a tray, crumbs of a scan.
+    It also rejects small parts that float so far away that they change the size of the object and what it rests on: pegs
+    printed beside a tray, or crumbs of a scan.
     """
     gap_m = gap_share * float(np.linalg.norm(np.ptp(solid.vertices, axis=0)))
     found = separate_objects(solid, gap_m=gap_m, object_share=object_share, rng=rng)

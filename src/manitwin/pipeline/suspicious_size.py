@@ -1,4 +1,4 @@
-"""A size that a mesh declares and such things do not have: said first where grasps fail, and a finding where they hold."""
+"""Declared sizes that are unusual for the object: reported first if grasps fail, and a failed check if they hold."""
 
 from __future__ import annotations
 

@@ -32,9 +32,9 @@ class Part:
 
 @dataclass(frozen=True)
 class SeparateObjects:
-    """The number of objects that stand apart from each other, and of parts that are too small to be one.
+    """The number of separate objects, and of parts too small to be objects.
 
-    ``larger_m (3,)`` is by how much the specks that float apart make the box along the axes larger than that of the objects.
+    ``larger_m (3,)``: by how much the floating small parts enlarge the axis-aligned bounding box of the objects.
     """
 
     count: int
@@ -63,9 +63,9 @@ def separate_objects(
 ) -> SeparateObjects:
     """Count the separate objects in a mesh.
 
-    Parts that touch, come within ``gap_m`` of each other, or lie mostly within one another's convex hull are one thing
-    (pads of a headset, screws, a lid over a pot). A group with less than ``object_share`` of the summed area and of
-    the summed hull volumes is no thing but specks; where all groups are so small, each is a thing (a plate of game pieces).
+    Parts belong to one object if they touch, come within ``gap_m`` of each other, or lie mostly inside one another's convex
+    hull (pads of a headset, screws, a lid over a pot). A group with less than ``object_share`` of the summed area and of the
+    summed hull volumes counts as specks; if all groups are that small, each is an object (a plate of game pieces).
     """
     every = connected_parts(mesh)
     parts = sorted(every, key=lambda part: -part.share)[:_MOST_PARTS]

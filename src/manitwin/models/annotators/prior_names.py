@@ -124,17 +124,17 @@ def _is_of_another(phrase: str, noun: str) -> bool:
 
 
 def found_by(name: str | None) -> tuple[Prior, str] | None:
-    """Find the prior of what a person calls a thing, and the words, in the singular, by which it is found.
+    """Find the prior of an everyday name, and the words, in the singular, by which it was found.
 
-    Tried in order: the whole name, or an alias of it; the part before 'of', 'with', 'without', 'no', 'for', 'in', 'on' or 'from';
-    the whole again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
-    which are mugs), and before its last word stands alone with words dropped between ('lego duplo brick' is a lego brick). The
-    last word decides what a thing is: a mug rack is no mug, but a pen cap is no cap either (``_ALONE``). Words are the same
-    written together or apart: a 'waterbottle' is a water bottle, and a 'tooth brush' a toothbrush before it is a brush. Where
-    none is found, numbers, measures, colours and what is printed on most packs say nothing at the end ('mug_1', 'cube 5 cm',
-    'pitcher blue' and 'juice smooth 500 ml' are a mug, a cube, a pitcher and juice), and what is a toy of anything is a toy, as
-    is a doll's chair. File names are never looked up: they are not evidence. What English has no such thing for, and is the
-    whole name of one in another language, is that.
+    The attempts, in order: the whole name or an alias; the part before 'of', 'with', 'without', 'no', 'for', 'in', 'on' or
+    'from'; the whole name again. Each is tried as it is, in the singular, and with words dropped from the front ('red coffee
+    mugs' are coffee mugs, which are mugs); before its last word is tried alone, words in between are dropped ('lego duplo
+    brick' is a lego brick). The last word decides: a mug rack is not a mug. It does not decide if it is in ``_ALONE``: a pen
+    cap is not a cap. Spelling with or without spaces is equivalent: a 'waterbottle' is a water bottle, and a 'tooth brush' a
+    toothbrush rather than a brush. If nothing is found, numbers, measures, colours and common package words at the end are
+    ignored ('mug_1', 'cube 5 cm', 'pitcher blue' and 'juice smooth 500 ml' are a mug, a cube, a pitcher and juice), and a toy
+    version of anything is a toy, as is a doll's chair. File names are never looked up, since they are not evidence. A name
+    without an English match is looked up as a whole in other languages.
     """
     return (_found_in_english(name) or _found_abroad(name)) if name else None
 
@@ -166,7 +166,7 @@ def _found_in_english(name: str) -> tuple[Prior, str] | None:
                 return (index["toy"], " ".join(head)) if small else (index[candidate], candidate)
         if of_another:
             break
-    if ":" in name:  # then what stands before it is a collection: 'Practice: hand wheel valve'
+    if ":" in name:  # the text before a colon names a collection: 'Practice: hand wheel valve'
         behind = found_by(name.rpartition(":")[2])
         if behind is not None:
             return behind

@@ -31,7 +31,7 @@ _WHAT_FOLLOWS = re.compile(r" (?:of|with|for|in) ")
 
 
 def noun_of(category: str) -> str:
-    """Return the noun of a category: ``bottle`` for ``ketchup bottle``, ``jar`` for ``jar of honey``, ``trash can`` for itself."""
+    """Return the noun of a category: ``bottle`` for ``ketchup bottle``, ``jar`` for ``jar of honey``; ``trash can`` stays."""
     if category in OF_ANOTHER_KIND:
         return category
     return _WHAT_FOLLOWS.split(category.removeprefix("pair of "), maxsplit=1)[0].split()[-1]
