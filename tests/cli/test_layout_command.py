@@ -91,4 +91,4 @@ def test_a_folder_of_something_else_is_refused(bottles: Path, tmp_path: Path) ->
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "config.json").write_text('{"kind": "trajectories"}')
     refused = CliRunner().invoke(app, [str(bottles), "-o", str(tmp_path / "out"), "-n", "1"])
-    assert "holds trajectories, not layouts; give another folder" in str(refused.exception)
+    assert "contains trajectories, not layouts; give another folder" in str(refused.exception)

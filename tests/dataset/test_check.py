@@ -149,7 +149,7 @@ def test_foreign_files_are_named_and_left(place: Path) -> None:
     (twins(place)[0] / "views").mkdir()
     (twins(place)[0] / "views/\x1bmine.png").write_text("mine")
     said = found(place, repair=True)
-    assert len(said) == 1 and r"holds views/\x1bmine.png, which is not its own" in said[0]
+    assert len(said) == 1 and r"contains views/\x1bmine.png, which does not belong to it" in said[0]
     assert (twins(place)[0] / "views/\x1bmine.png").exists()
 
 
@@ -218,7 +218,7 @@ def test_folder_of_other_things_is_refused_and_left(place: Path) -> None:
     (place / "config.json").write_text('{"kind": "trajectories"}')
     shutil.rmtree(place / "twins")
     done = CliRunner().invoke(app, ["check", str(place)])
-    assert isinstance(done.exception, UsageError) and "holds trajectories, not twins" in str(done.exception)
+    assert isinstance(done.exception, UsageError) and "contains trajectories, not twins" in str(done.exception)
     with read_ledger(place / "ledger.sqlite") as ledger:
         assert ledger.execute("SELECT count(*) FROM items WHERE state = 'accepted'").fetchone()[0] == 3
 

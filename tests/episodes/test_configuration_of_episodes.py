@@ -22,5 +22,5 @@ def test_a_data_set_is_called_one(tmp_path: Path) -> None:
 
 def test_what_is_missing_is_named(tmp_path: Path) -> None:
     (tmp_path / CONFIG).write_text('{"run": {}}')
-    with pytest.raises(EpisodesError, match=r"config\.json: not of episodes \(robot: "):
+    with pytest.raises(EpisodesError, match=r"config\.json: not a configuration of episodes \(robot: "):
         read_configuration(tmp_path)

@@ -65,4 +65,4 @@ def test_a_side_of_the_thing_is_no_table_and_without_one_there_is_no_layout(seen
     place = place_of(seen, 0.5)
     depth = np.where(seen.mask, seen.view.depth_m, 0.0)
     alone = LocatedView(type(seen.view)(depth, seen.view.intrinsics), place.things)
-    assert isinstance(alone.scene, NoLayout) and "knows 0 depths" in alone.scene.reason
+    assert isinstance(alone.scene, NoLayout) and "only 0 known depths" in alone.scene.reason

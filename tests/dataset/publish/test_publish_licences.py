@@ -64,7 +64,7 @@ def test_nothing_to_publish_says_which_licences_are_there(allow: list[str]) -> N
 
 
 def test_nothing_there_is_not_called_a_matter_of_licences() -> None:
-    with pytest.raises(UsageError, match="no accepted twin is there") as raised:
+    with pytest.raises(UsageError, match="there is no accepted twin to publish") as raised:
         select([], None)
     assert "licence" not in str(raised.value)
 

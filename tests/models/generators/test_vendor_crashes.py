@@ -58,7 +58,7 @@ def test_job_is_paid_once_whenever_the_process_ends(name: str, tmp_path: Path) -
             after = run(vendor.generator(settings), folder, settings)
             assert len(vendor.fake.tasks) <= 1
             if after.made is None:
-                assert type(after.error) is BadReply and "broken off" in str(after.error)
+                assert type(after.error) is BadReply and "was interrupted" in str(after.error)
                 unknown.append(fuse.steps[-1])
             else:
                 assert len(vendor.fake.tasks) == 1 and after.usd == USD, "a crash loses no cost either"

@@ -69,7 +69,7 @@ def test_a_program_that_fails_is_told_in_one_line(tmp_path: Path, text: str, err
 @pytest.mark.parametrize(
     ("spec", "said"),
     [
-        ("foundationpose", "names none"),
+        ("foundationpose", "is not a pose estimator"),
         ("command:", "it needs {request} and {out}"),
         ("command:run {request}", "it needs {request} and {out}"),
         ("command:run {request} {output}", "did you mean 'out'|unknown placeholder"),

@@ -38,7 +38,7 @@ def test_a_run_of_layouts_is_found_loaded_and_goes_on(tmp_path: Path) -> None:
         tmp_path / "twins_here", out, 5, CONFIG, executor="inline", on_start=lambda items, todo: opened.append(todo)
     )
     assert opened == [2] and (out / scene_name("layout_4_000001") / "scene.json").read_bytes() == before
-    with pytest.raises(UsageError, match="holds layouts, not twins"):
+    with pytest.raises(UsageError, match="contains layouts, not twins"):
         stored_config(DatasetRoot(out))
     totals = layout_totals(out)
     assert totals.accepted == 5 and totals.acceptance == 1.0

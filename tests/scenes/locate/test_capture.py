@@ -58,7 +58,7 @@ def test_a_layout_is_seen_as_it_stands_in_the_robots_frame(scene: Path, tmp_path
 def test_a_scene_without_that_camera_and_a_folder_of_several_are_refused(scene: Path) -> None:
     with pytest.raises(UsageError, match="unknown camera 'behind'"):
         capture_of_scene(scene, "behind", 0)
-    with pytest.raises(UsageError, match="holds 2 scenes; give the folder of one"):
+    with pytest.raises(UsageError, match="contains 2 scenes; give the folder of one"):
         capture_of_scene(scene.parents[2], "front", 0)
 
 

@@ -49,7 +49,7 @@ def test_cameras_of_others_are_read(tmp_path: Path, changed: dict[str, Any], uni
     [
         ({"depth_unit_m": None}, "does not give the unit"),
         ({"depth_unit_m": None, "depth_scale": 0.001}, "librealsense"),
-        ({"depth_unit_m": 1000}, "metres a unit"),
+        ({"depth_unit_m": 1000}, "metres per unit"),
         ({"fx": -1}, "fx is -1"),
         ({"width": None}, "width is missing"),
         ({"K": [1, 2, 3]}, "3 x 3"),

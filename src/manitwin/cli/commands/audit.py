@@ -77,7 +77,7 @@ def audit(
     templates: list[Path] = []
     assets = find_all(paths, fragments, templates)
     if not assets:
-        raise UsageError(f"{', '.join(map(str, paths))}: no asset of a known format found; {VALID_ASSETS}")
+        raise UsageError(f"{', '.join(map(str, paths))}: no asset of a known format; {VALID_ASSETS}")
     audited = []
     for each in audit_all(assets, rules, jobs=jobs, fix=fix, named=paths, engines=run_in, engine=engine):
         each = each if known is None else known.without_known(each)

@@ -17,5 +17,5 @@ def pose_estimator(spec: str, services: ServicesConfig) -> PoseEstimator:
     if kind in ("http", "https"):
         return ServedEstimator(spec, services)
     raise ConfigError(
-        f"--estimator {spec!r}: is not a pose estimator; give 'command:PROGRAM {{request}} {{out}}' or http://HOST:PORT"
+        f"--estimator {spec!r} is not a pose estimator; give 'command:PROGRAM {{request}} {{out}}' or http://HOST:PORT"
     )
