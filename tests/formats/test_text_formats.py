@@ -58,9 +58,15 @@ def test_json_that_is_no_object_is_refused(tmp_path: Path, text: str) -> None:
     refused(caught, "a.json: contains a JSON", "not an object")
 
 
-@pytest.mark.parametrize("value", [10**400, -(10**400), float("inf"), float("nan"), 1e10, "3", True, None])
-def test_number_that_no_object_has_is_refused(value: Any) -> None:
-    with pytest.raises(Exception, match=r"^mass: .* is (not a number|out of range for an object)"):
+@pytest.mark.parametrize("value", [10**400, -(10**400), float("inf"), float("nan"), 1e10])
+def test_number_that_no_object_has_is_refused(value: float) -> None:
+    with pytest.raises(Exception, match=r"^mass: .* is out of range for an object"):
+        json_number(value, "mass")
+
+
+@pytest.mark.parametrize("value", ["3", True, None])
+def test_what_is_no_number_is_refused(value: Any) -> None:
+    with pytest.raises(Exception, match=r"^mass: .* is not a number"):
         json_number(value, "mass")
 
 

@@ -68,9 +68,9 @@ def photos_beside(subject: Subject, side_px: int) -> list[str | Picture]:
     If there are more than ``MOST_PHOTOS``, an even selection is returned. Raises OSError for a photo that cannot be read.
     """
     count = len(subject.photos)
-    shown = np.unique(np.linspace(0, count, min(count, MOST_PHOTOS), endpoint=False).astype(int))
+    shown = min(count, MOST_PHOTOS)
     parts: list[str | Picture] = []
-    for index in shown:
+    for index in (number * count // shown for number in range(shown)):
         which = "The photo" if count == 1 else f"Photo {index + 1} of {count}"
         with Image.open(subject.photos[index]) as image:
             parts += [f"{which} that it was made of:", cut_out_picture(np.asarray(image.convert("RGBA")), side_px)]
