@@ -46,14 +46,25 @@ NAMES = {
 }
 
 
+SLOW_TO_BUILD = ("cmyk.jpg", "gray16.png", "exif_rotated.jpg", "nonmanifold.obj")
+"""Those that are built beside the originals that they are compared with, by the slow tests."""
+
+
 @pytest.fixture(scope="module")
 def results(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, ItemResult]:
-    """Build all of them, and the upright originals that some are compared with, in one command."""
-    folder = tmp_path_factory.mktemp("bad")
+    """Build all but the slow ones in one command."""
     with (shared_data / "bad" / "manifest.csv").open() as stream:
         files = [row["file"] for row in csv.DictReader(stream)]
     assert set(files) == set(REJECTED) | set(NAMES)
-    rows = [(shared_data / "bad" / file, NAMES.get(file, "")) for file in files]
+    rows = [(shared_data / "bad" / file, NAMES.get(file, "")) for file in files if file not in SLOW_TO_BUILD]
+    return build_rows(rows, tmp_path_factory.mktemp("bad"))
+
+
+@pytest.fixture(scope="module")
+def compared(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, ItemResult]:
+    """Build the slow ones and the upright originals that they are compared with in one command."""
+    folder = tmp_path_factory.mktemp("compared")
+    rows = [(shared_data / "bad" / file, NAMES[file]) for file in SLOW_TO_BUILD]
     rows += [
         (shared_data / "photos" / "claw_hammer.jpg", "hammer"),
         (shared_data / "photos" / "steel_fork.jpg", "fork"),
@@ -62,6 +73,11 @@ def results(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict
         ImageOps.exif_transpose(turned).save(folder / "upright.png")
     rows += [(folder / "upright.png", "hammer")]
     rows += [(shared_data / "meshes" / "toy_dinosaur" / "dinosaur_figure.obj", "toy")]
+    return build_rows(rows, folder)
+
+
+def build_rows(rows: list[tuple[Path, str]], folder: Path) -> dict[str, ItemResult]:
+    """Build files with their names; return the results by file name."""
     manifest = folder / "manifest.csv"
     manifest.write_text("file,name\n" + "".join(f"{file},{name}\n" for file, name in rows))
     # one worker: several would each load what it loads, and tests run side by side as it is
@@ -102,16 +118,18 @@ def test_missing_texture_is_a_finding(results: dict[str, ItemResult]) -> None:
     assert any("mtl" in check.message for check in found.quality.checks if check.passed is False)
 
 
-def test_damaged_dinosaur_has_the_volume_of_the_clean_one(results: dict[str, ItemResult]) -> None:
-    damaged, clean = record(results["nonmanifold.obj"]), record(results["dinosaur_figure.obj"])
+@pytest.mark.slow
+def test_damaged_dinosaur_has_the_volume_of_the_clean_one(compared: dict[str, ItemResult]) -> None:
+    damaged, clean = record(compared["nonmanifold.obj"]), record(compared["dinosaur_figure.obj"])
     assert damaged.mesh is not None and clean.mesh is not None
     assert damaged.mesh.volume_m3 == pytest.approx(clean.mesh.volume_m3, rel=0.02)
     assert any("holes" in repair for repair in damaged.mesh.repairs)
     assert not any("holes" in repair for repair in clean.mesh.repairs)
 
 
-def test_exif_rotation_gives_the_twin_of_the_upright_photo(results: dict[str, ItemResult]) -> None:
-    turned, upright, original = (record(results[f]) for f in ("exif_rotated.jpg", "upright.png", "claw_hammer.jpg"))
+@pytest.mark.slow
+def test_exif_rotation_gives_the_twin_of_the_upright_photo(compared: dict[str, ItemResult]) -> None:
+    turned, upright, original = (record(compared[f]) for f in ("exif_rotated.jpg", "upright.png", "claw_hammer.jpg"))
     assert turned.physical is not None and upright.physical is not None and original.physical is not None
     # the same pixels stored upright: the same twin
     assert turned.physical.extents_m == pytest.approx(upright.physical.extents_m, abs=1e-4)
@@ -128,8 +146,9 @@ def mean_lab(photo: Path) -> np.ndarray:
     return cv2.cvtColor(pixels, cv2.COLOR_RGB2LAB).reshape(-1, 3).mean(0)
 
 
-def test_cmyk_photo_keeps_its_colours(results: dict[str, ItemResult], shared_data: Path) -> None:
-    assert results["cmyk.jpg"].status == results["steel_fork.jpg"].status
+@pytest.mark.slow
+def test_cmyk_photo_keeps_its_colours(compared: dict[str, ItemResult], shared_data: Path) -> None:
+    assert compared["cmyk.jpg"].status == compared["steel_fork.jpg"].status
     # 10 is what two people would call the same colour in two photos; inverted CMYK is 50 and more away
     converted, original = shared_data / "bad" / "cmyk.jpg", shared_data / "photos" / "steel_fork.jpg"
     assert np.linalg.norm(mean_lab(converted) - mean_lab(original)) < 10
@@ -147,8 +166,9 @@ def test_colour_under_transparent_pixels_never_shows(results: dict[str, ItemResu
         assert not ((red > 180) & (green < 60) & (blue > 180)).any()
 
 
-def test_sixteen_bit_photo_is_scaled_not_clipped(results: dict[str, ItemResult]) -> None:
-    result = results["gray16.png"]
+@pytest.mark.slow
+def test_sixteen_bit_photo_is_scaled_not_clipped(compared: dict[str, ItemResult]) -> None:
+    result = compared["gray16.png"]
     found = record(result)
     if found.status == "rejected":
         assert found.rejection is not None and found.rejection.stage == "generate"

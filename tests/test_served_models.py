@@ -255,7 +255,7 @@ def test_a_refused_key_stops_the_run_with_its_reason(tmp_path: Path, fault: str)
         pytest.param("refusal", marks=pytest.mark.slow),
         pytest.param("cut_answer", marks=pytest.mark.slow),
         "wrong_schema",
-        "implausible",
+        pytest.param("implausible", marks=pytest.mark.slow),
     ],
 )
 def test_an_answer_that_cannot_be_used_is_never_accepted(tmp_path: Path, fault: str) -> None:

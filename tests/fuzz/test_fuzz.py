@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from fuzz_harness import all_targets, fuzz, fuzz_cases
 
-CASES, SLOW_CASES = 25, 10_000
+CASES, SLOW_CASES = 12, 10_000
 SHARED_CASES = 1_000
 TARGETS = all_targets()
 

@@ -94,6 +94,7 @@ def test_what_shows_nothing_has_no_cut_out(tmp_path: Path) -> None:
     assert (caught.value.reason, caught.value.files) == ("no_object", {})
 
 
+@pytest.mark.slow
 def test_confirmed_cut_out_becomes_a_twin_and_stays_one(tmp_path: Path) -> None:
     place, runner, photo = tmp_path / "twins", CliRunner(), tmp_path / "thing.jpg"
     shutil.copy(SAMPLE, photo)

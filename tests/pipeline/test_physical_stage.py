@@ -215,7 +215,9 @@ def test_a_bottle_says_what_it_weighs_empty_half_full_and_full(tmp_path: Path) -
 
 @pytest.mark.parametrize("share", [0.0, 0.5])
 @pytest.mark.parametrize("thick_m", [(0.0005, 0.0005), (0.0015, 0.0005), (0.0005, 0.0015)])
-@pytest.mark.parametrize("wall_factor", [0.6, 1.0, 1.8])
+@pytest.mark.parametrize(
+    "wall_factor", [pytest.param(0.6, marks=pytest.mark.slow), pytest.param(1.0, marks=pytest.mark.slow), 1.8]
+)
 def test_true_center_of_a_bottle_with_an_uneven_wall_is_within_its_states_uncertainty(
     tmp_path: Path, share: float, thick_m: tuple[float, float], wall_factor: float
 ) -> None:

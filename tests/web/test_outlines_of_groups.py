@@ -55,6 +55,7 @@ def messages_of(record: TwinRecord) -> dict[str, str]:
     return {check.name: check.message for check in record.quality.checks}
 
 
+@pytest.mark.slow
 def test_each_photo_is_shown_kept_by_its_place_and_built(root: DatasetRoot) -> None:
     session = OutlineSession(root, "ada")
     front, side = session.photos

@@ -334,6 +334,7 @@ def test_a_sparse_file_is_refused_by_its_size(tmp_path: Path, name: str) -> None
         read_mesh(path)
 
 
+@pytest.mark.slow
 def test_what_passes_the_processs_memory_is_too_large_in_one_line(tmp_path: Path) -> None:
     """In a process of 1.5 GB: nine textures of 64 megapixels, of which eight are within the limits."""
     written(tmp_path, "textures.glb", textured(*(png(8000, 8000, i) for i in range(8))))

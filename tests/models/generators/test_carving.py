@@ -144,6 +144,7 @@ def test_poses_stand_for_turns_and_give_the_size(tmp_path: Path, monkeypatch: py
         carve_photos(paths, None, poses=tmp_path / "nothing.json")
 
 
+@pytest.mark.slow
 def test_alpha_channels_count_as_in_a_build(tmp_path: Path) -> None:
     """A faint cut-out is the thing, a second thing beside it is none, and bars around a picture cut nothing out."""
     plain = [_photo(BOX, turn) for turn in (0, 90)]

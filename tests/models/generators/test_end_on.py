@@ -43,6 +43,7 @@ def test_what_has_an_ellipse_for_its_outline_is_made(name: str) -> None:
     assert from_photo(_ellipse(170, 220), name).notes["primitive"] == f"template:{name}"
 
 
+@pytest.mark.slow
 def test_a_circle_is_no_end_of_a_long_thing_that_is_only_likely() -> None:
     circle = _ellipse(200, 200)
     made = from_photo(circle, None, likely=[("salt shaker", 0.6)]).notes["primitive"]

@@ -242,6 +242,7 @@ def test_turned_photo_gives_the_geometry_of_its_original(shared_data: Path) -> N
     _check_same_geometry(_lifted_photo(turned), _lifted_photo(original))
 
 
+@pytest.mark.slow
 @pytest.mark.shared_data
 def test_photo_in_cmyk_gives_the_geometry_of_its_original(shared_data: Path, tmp_path: Path) -> None:
     original = shared_data / "photos" / "claw_hammer.jpg"
@@ -319,6 +320,7 @@ def test_a_lemon_with_both_its_tips_lies_along_an_axis(degrees: float) -> None:
     assert width == pytest.approx(1.0) and depth == pytest.approx(reach[100] / reach[0], abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_can_seen_nearly_from_above_is_no_egg() -> None:
     around = np.linspace(0, 2 * math.pi, 200)
     askew = _turned(list(zip(300 + 140 * np.cos(around), 300 + 200 * np.sin(around), strict=True)), 14)

@@ -56,6 +56,7 @@ def _thickness(job: Job, folder: Path) -> float:
     return float(thin / thick)
 
 
+@pytest.mark.slow
 def test_a_bottle_that_is_cut_out_unevenly_is_round_by_its_likely_names(tmp_path: Path) -> None:
     photo = _lying_bottle()
     flat, thick = from_photo(photo, None, likely=FLAT), from_photo(photo, None, likely=ROUND)

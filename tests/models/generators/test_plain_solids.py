@@ -123,6 +123,7 @@ def test_a_disc_whose_edge_is_seen_is_one_where_its_outline_alone_may_be_an_egg(
         from_photo(ellipse, None)
 
 
+@pytest.mark.slow
 def test_a_rectangle_of_which_no_edge_is_seen_may_be_anything() -> None:
     front = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
     cv2.rectangle(front, (120, 60), (520, 580), TOP, -1)
@@ -151,7 +152,9 @@ def torn_front() -> tuple[np.ndarray, Fitted]:
     return front, slab
 
 
-@pytest.mark.parametrize(("outline", "primitive"), [(0.0029, "box"), (0.0018, "shape of template:book")])
+@pytest.mark.parametrize(
+    ("outline", "primitive"), [(0.0029, "box"), pytest.param(0.0018, "shape of template:book", marks=pytest.mark.slow)]
+)
 def test_the_front_of_a_box_is_a_likely_thing_seen_at_an_angle_only_where_that_explains_it_closely(
     outline: float, primitive: str, torn_front: tuple[np.ndarray, Fitted], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -199,6 +202,7 @@ def test_what_is_nearly_explained_is_the_plain_solid_where_its_edges_are_seen(
     assert from_photo(_seen(_circle(0.08), 0.10, 35), None).notes["primitive"] == primitive
 
 
+@pytest.mark.slow
 def test_what_is_no_such_thing_as_its_template_makes_is_the_plain_solid_that_explains_it() -> None:
     thick = _seen(_rounded(0.20, 0.10, 0.03), 0.05, 30)
     assert from_photo(thick, "envelope").notes["primitive"] == "slab"

@@ -191,6 +191,7 @@ def test_the_distortion_of_a_lens_is_undone(fisheye: bool) -> None:
     assert to_manifold(carved.surface).volume() == pytest.approx(to_manifold(straight.surface).volume(), rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarser")
 def test_a_photo_that_was_scaled_since_makes_the_same() -> None:
     half = [cv2.resize(photo, (WIDTH // 2, HEIGHT // 2), interpolation=cv2.INTER_AREA) for photo in PHOTOS]

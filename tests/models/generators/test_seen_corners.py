@@ -112,6 +112,7 @@ def test_a_circle_and_an_ellipse_that_is_said_to_be_round_are_solids_of_revoluti
     assert lift(_ellipse(150, 250), ShapeHint(round=True)).notes["primitive"] == "revolution"
 
 
+@pytest.mark.slow
 def test_a_long_speaker_is_a_box_that_lies_and_no_speaker_on_its_end() -> None:
     view = View(np.radians(40), np.radians(35), np.radians(12), 0.2)
     made = from_photo(_drawn((0.2, 0.055, 0.07), view), "speaker")

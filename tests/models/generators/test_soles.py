@@ -38,6 +38,7 @@ def test_a_figure_keeps_its_feet_and_both_stand_on_the_ground(back_foot_px: int)
     assert tip_angle_deg(lifted.surface) >= 5
 
 
+@pytest.mark.slow
 def test_the_overlap_is_that_of_what_stands() -> None:
     level, staggered = (lift(_figure(back_foot_px=px), STANDS).explained.silhouette_iou for px in (0, 20))
     assert level > 0.97

@@ -71,6 +71,7 @@ def test_three_level_photos_by_hand_are_taken_as_such() -> None:
     assert carve(photos, turns).camera is None
 
 
+@pytest.mark.slow
 def test_turns_that_run_the_other_way_round_are_told() -> None:
     photos, turns = _turned(5, 25.0)
     with pytest.raises(Rejected, match="where the turns are counted the other way round"):
@@ -102,6 +103,7 @@ def test_of_many_that_do_not_go_together_one_is_named() -> None:
     assert str(refused.value).count(".png") == 1
 
 
+@pytest.mark.slow
 def test_a_photo_that_was_scaled_is_used_and_one_that_was_cropped_is_named() -> None:
     photos, turns = _turned(5, 25.0)
     half = [*photos[:2], ("half.png", photos[2][1][::2, ::2]), *photos[3:]]

@@ -55,7 +55,10 @@ def test_the_question_is_the_documented_one() -> None:
     assert infer["point_cloud"].dtype == np.float32
 
 
-@pytest.mark.parametrize("name", ["panda", "robotiq_2f85", "wsg50_110"])
+@pytest.mark.parametrize(
+    "name",
+    ["panda", *(pytest.param(name, marks=pytest.mark.slow) for name in ("robotiq_2f85", "wsg50_110"))],
+)
 def test_every_parallel_gripper_gets_grasps_that_pass_its_filters(name: str) -> None:
     hand = gripper(name)
     request = request_for(400, gripper=hand)

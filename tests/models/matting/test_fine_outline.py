@@ -66,7 +66,7 @@ COLOURS = (
 """Linear, of a thing and its ground, and the least overlap that is reached from a mask that is too wide."""
 
 
-@pytest.mark.parametrize("width_px", [6.0, 9.0, 14.0])
+@pytest.mark.parametrize("width_px", [6.0, pytest.param(9.0, marks=pytest.mark.slow), 14.0])
 @pytest.mark.parametrize(("thing", "ground", "least"), COLOURS)
 def test_a_thin_ring_is_drawn_to_a_fraction_of_a_pixel(
     thing: tuple[float, float, float], ground: float, least: float, width_px: float

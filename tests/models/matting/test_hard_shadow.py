@@ -118,6 +118,7 @@ def test_object_much_darker_than_its_hard_shadow_is_told_from_it() -> None:
     assert _overlap(_photo(scene), BODY) > 0.97
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "grey", [pytest.param(0.08, marks=pytest.mark.slow), 0.16, pytest.param(0.3, marks=pytest.mark.slow)]
 )

@@ -120,6 +120,7 @@ def test_two_networks_are_asked_only_about_what_is_doubted_without_them(
     assert asked == [0, 0, 2]
 
 
+@pytest.mark.slow
 def test_that_two_networks_agree_does_not_tell_one_whole_thing(tmp_path: Path) -> None:
     one, _ = _photo((220, 30, 30))
     several = one.copy()

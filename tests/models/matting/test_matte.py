@@ -73,7 +73,12 @@ def test_a_things_soft_edge_is_no_shadow() -> None:
 
 @pytest.mark.parametrize(
     ("light", "believed"),
-    [(1.1, False), (0.8, False), (0.7, True), (0.5, True)],
+    [
+        pytest.param(1.1, False, marks=pytest.mark.slow),
+        (0.8, False),
+        (0.7, True),
+        pytest.param(0.5, True, marks=pytest.mark.slow),
+    ],
     ids=["paler than the ground", "as dim as a faint shadow", "dimmer", "half as light"],
 )
 def test_cap_of_the_ground_s_colour_with_an_outline_in_focus_is_no_shadow(light: float, believed: bool) -> None:
@@ -91,6 +96,7 @@ def test_cap_of_the_ground_s_colour_with_an_outline_in_focus_is_no_shadow(light:
     assert (study.confidence >= MIN_CONFIDENCE) == believed
 
 
+@pytest.mark.slow
 def test_grey_body_that_fills_the_frame_is_no_gap() -> None:
     """A smooth surface explains it as well as the ground, and nothing but its own edge is around it."""
     scene = np.full((*SIZE, 3), 214.0) + np.random.default_rng(0).normal(0, 1.0, (*SIZE, 3))

@@ -63,6 +63,7 @@ def test_another_thing_and_one_of_another_size_are_refused(stool: PoseModel, jar
         assert f"{answer.best_score:.0%} of what is seen" in answer.reason
 
 
+@pytest.mark.slow
 def test_a_body_of_revolution_has_one_pose_and_any_turn_of_it_is_the_same() -> None:
     can = PoseModel.of_mesh("can", trimesh.creation.cylinder(0.035, 0.11, sections=64))
     seen = seen_from(can, 1.0)

@@ -23,7 +23,12 @@ def test_a_scaled_model_is_that_of_the_scaled_mesh(stool: PoseModel) -> None:
 
 
 @pytest.mark.parametrize(
-    "factor", [pytest.param(0.72, marks=pytest.mark.slow), pytest.param(1.0, marks=pytest.mark.slow), 1.37]
+    "factor",
+    [
+        pytest.param(0.72, marks=pytest.mark.slow),
+        pytest.param(1.0, marks=pytest.mark.slow),
+        pytest.param(1.37, marks=pytest.mark.slow),
+    ],
 )
 def test_the_true_size_is_found_and_the_pose_with_it(stool: PoseModel, factor: float) -> None:
     true = stool.scaled(factor)

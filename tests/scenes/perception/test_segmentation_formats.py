@@ -223,7 +223,7 @@ def test_bop_symmetries_keep_the_models_as_they_are(written: Path) -> None:
     ("mesh", "discrete", "continuous"),
     [
         (trimesh.creation.box((0.06, 0.06, 0.06)), 23, 0),
-        (trimesh.creation.cylinder(0.025, 0.14, sections=6), 11, 0),
+        pytest.param(trimesh.creation.cylinder(0.025, 0.14, sections=6), 11, 0, marks=pytest.mark.slow),
         (trimesh.creation.icosphere(subdivisions=3, radius=0.035), 23, 3),
     ],
     ids=["cube", "hexagonal prism", "ball"],

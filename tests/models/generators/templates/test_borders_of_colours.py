@@ -49,7 +49,7 @@ def test_mass_and_inertia_are_those_of_the_thing_in_one_colour() -> None:
     assert rimmed[2] == pytest.approx(plain[2], rel=1e-12)
 
 
-@pytest.mark.parametrize("group", GROUPS)
+@pytest.mark.parametrize("group", [GROUPS[0], *(pytest.param(group, marks=pytest.mark.slow) for group in GROUPS[1:])])
 def test_every_part_of_a_template_can_end_at_edges(group: str) -> None:
     with_regions = 0
     for category, template in TEMPLATES.items():

@@ -70,7 +70,7 @@ def photo_of(category: str, view: View, measures: dict[str, float], *, letters: 
     ("category", "view", "measures"),
     [
         ("colander", View(0.5, 0.5, 0.0, 0.2), {"height": 0.52}),
-        ("grater", View(0.2, 0.9, 0.0, 0.2), {"taper": 0.75, "width": 0.5}),
+        pytest.param("grater", View(0.2, 0.9, 0.0, 0.2), {"taper": 0.75, "width": 0.5}, marks=pytest.mark.slow),
     ],
 )
 def test_small_holes_need_not_be_where_the_template_makes_them(
@@ -344,6 +344,7 @@ def test_a_cup_with_a_lip_and_a_question_mark_for_an_ear_gets_both() -> None:
     assert found["flare"] > 0.08 and found["join"] == pytest.approx(0.22, abs=0.05) and found["hook"] > 0.7
 
 
+@pytest.mark.slow
 def test_kind_that_comes_nearest_is_searched_by_itself_where_it_is_not_believed() -> None:
     # a little bent, as no template makes it: from the few views of other kinds the saucer is found, and not the ear
     measures = {
