@@ -18,11 +18,11 @@ import numpy as np
 import trimesh
 from PIL import Image, ImageEnhance
 
-from manitwin.dataset.collect.looks import ALIKE, PICTURE, SHAPE, picture_look, shape_look, similarity
+from manitwin.dataset.collect.looks import ALIKE, PICTURE, SHAPE, picture_feature, shape_feature, similarity
 from manitwin.errors import InputError
 from manitwin.formats.meshes.read import read_mesh
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
-from manitwin.render.raycast import merged
+from manitwin.render.raycast import merge_parts
 
 
 def changed_pictures(picture: Image.Image) -> list[Image.Image]:
@@ -72,9 +72,9 @@ def main() -> None:
     files = sorted(file for file in arguments.folder.rglob("*") if file.is_file())
     photos = drawn([file for file in files if file.suffix.lower() in IMAGE_SUFFIXES], arguments.most, rng)
     pictures = [Image.open(file).convert("RGB") for file in photos]
-    looks = np.array([picture_look(np.asarray(picture)) for picture in pictures])
+    looks = np.array([picture_feature(np.asarray(picture)) for picture in pictures])
     same = [
-        float(picture_look(np.asarray(each)) @ look)
+        float(picture_feature(np.asarray(each)) @ look)
         for picture, look in zip(pictures, looks, strict=True)
         for each in changed_pictures(picture)
     ]
@@ -83,10 +83,10 @@ def main() -> None:
     meshes = []
     for file in drawn([file for file in files if file.suffix.lower() in MESH_SUFFIXES], arguments.most, rng):
         with suppress(InputError):
-            meshes.append(merged(read_mesh(file).parts))
-    shapes = np.array([shape_look(mesh) for mesh in meshes])
+            meshes.append(merge_parts(read_mesh(file).parts))
+    shapes = np.array([shape_feature(mesh) for mesh in meshes])
     kept = [
-        float(similarity(shape, shape_look(each)[None], SHAPE)[0])
+        float(similarity(shape, shape_feature(each)[None], SHAPE)[0])
         for mesh, shape in zip(meshes, shapes, strict=True)
         for each in changed_meshes(mesh, rng)
     ]

@@ -18,11 +18,11 @@ import trimesh
 from points import held_out
 
 from manitwin.geometry.mass_properties import solid_mass_properties
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.known import mass_properties
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.ground_truth import mass_properties
+from manitwin.models.generators.templates.object_sampling import make_object
 from manitwin.pipeline.mass_by_parts import mass_by_parts
 
 
@@ -34,7 +34,7 @@ def main() -> None:
     arguments = parser.parse_args()
     rows, untold, started = [], 0, time.process_time()
     for category in sorted(load_templates()):
-        prior = lookup(category)
+        prior = find_prior(category)
         if prior is None or not prior.part_materials or held_out(category) != arguments.held_out:
             continue
         for seed in range(arguments.seeds):
@@ -56,9 +56,9 @@ def main() -> None:
 
 def distances_mm(category: str, seed: int) -> tuple[float, float] | None:
     """Return the distances (mm) of both estimates to the true centre, or None where no parts can be recognised."""
-    templates, prior = load_templates(), lookup(category)
+    templates, prior = load_templates(), find_prior(category)
     assert prior is not None
-    made = make(templates[category], read_text(category, templates), np.random.default_rng(seed))
+    made = make_object(templates[category], read_text(category, templates), np.random.default_rng(seed))
     solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
     mass_kg, center_m, _ = mass_properties(made.solids)
     materials = {str(role): material for role, material in prior.part_materials.items()}

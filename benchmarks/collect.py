@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from manitwin.dataset.collect.intake import Given, add
+from manitwin.dataset.collect.intake import DefaultValues, add_inputs
 from manitwin.dataset.collect.plan_files import write_plan
 from manitwin.dataset.collect.planning import plan_inputs
 from manitwin.dataset.collect.status import catalogue_status
@@ -65,8 +65,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as made:
         listed, catalogue = Path(made, "list.jsonl"), Path(made, "catalogue.db")
         write_list(listed, count)
-        timed(f"add {count:,} rows", lambda: add(catalogue, listed, Given()))
-        timed("add them again", lambda: add(catalogue, listed, Given()))
+        timed(f"add {count:,} rows", lambda: add_inputs(catalogue, listed, DefaultValues()))
+        timed("add them again", lambda: add_inputs(catalogue, listed, DefaultValues()))
         status = timed("status", lambda: catalogue_status(catalogue), REPEATS)
         print(f"{catalogue.stat().st_size / 1e6:.1f} MB")
         with Catalogue(catalogue) as opened:

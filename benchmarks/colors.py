@@ -30,12 +30,12 @@ from manitwin.errors import UsageError
 from manitwin.formats.meshes.textures import linear_to_srgb, srgb_to_linear
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
-from manitwin.models.annotators.surface_color import lab_from_srgb, named_colors, seen_from_outside
+from manitwin.models.annotators.surface_color import is_visible_outside, lab_from_srgb, name_colors
 from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.description_parser import read_text
 from manitwin.models.generators.templates.looks import COLORS
-from manitwin.models.generators.templates.made import Made
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.object_sampling import make_object
+from manitwin.models.generators.templates.template_object import TemplateObject
 
 SAMPLES = 3000
 AROUND = 24
@@ -108,7 +108,7 @@ def score(category: str, word: str, rng: np.random.Generator, *, flat: bool) -> 
     """
     templates = load_templates()
     try:
-        made = make(templates[category], read_text(f"a {word} {category}", templates), rng)
+        made = make_object(templates[category], read_text(f"a {word} {category}", templates), rng)
     except UsageError:
         return None
     mesh = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
@@ -120,8 +120,8 @@ def score(category: str, word: str, rng: np.random.Generator, *, flat: bool) -> 
     if metal.mean() > 0.5:
         return None  # a mirror shows the colour of its surroundings
     seen = own if flat else captured(mesh, points, normals, own, gloss, rng)
-    outside = seen_from_outside(mesh, points, normals)
-    names = named_colors(lab_from_srgb(np.clip(linear_to_srgb(seen), 0, 1))[outside], bool(metal.any()))
+    outside = is_visible_outside(mesh, points, normals)
+    names = name_colors(lab_from_srgb(np.clip(linear_to_srgb(seen), 0, 1))[outside], bool(metal.any()))
     truths = true_shares(made, mesh)
     said = [color.name for color in names]
     truth_words = ", ".join(f"{name} {share:.0%}" for name, share in truths.items())
@@ -141,7 +141,7 @@ def questions(said: list[str], truths: dict[str, float], is_right: Callable[[str
     return outcome
 
 
-def true_shares(made: Made, mesh: trimesh.Trimesh) -> dict[str, float]:
+def true_shares(made: TemplateObject, mesh: trimesh.Trimesh) -> dict[str, float]:
     """Return the share of the surface for each colour word, by the nearest word to each part's colour."""
     shares: dict[str, float] = {}
     for number, part in enumerate(made.mesh.names):

@@ -11,10 +11,10 @@ from composite_categories import COMPOSITE_CATEGORIES
 
 from manitwin.errors import ManiTwinError
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.described import Wish
-from manitwin.models.generators.templates.made import visual_parts
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import Wanted
+from manitwin.models.generators.templates.description_parser import ObjectDescription
+from manitwin.models.generators.templates.look_phrases import LookRequest
+from manitwin.models.generators.templates.object_sampling import make_object
+from manitwin.models.generators.templates.template_object import visual_parts
 from manitwin.render.cameras import Camera, framing_camera
 from manitwin.render.renderer import shared_renderer
 
@@ -54,9 +54,9 @@ def draw_thing(rng: np.random.Generator, beside: Thing | None, part: Part) -> Th
     names = [name for name in COMPOSITE_CATEGORIES if part != "training" or not is_unseen(name)]
     while True:
         category = names[int(rng.integers(len(names)))]
-        wish = Wish(rgb=tuple(rng.uniform(0.03, 0.97, 3))) if rng.random() < 0.3 else Wish()  # type: ignore[arg-type]
+        wish = LookRequest(rgb=tuple(rng.uniform(0.03, 0.97, 3))) if rng.random() < 0.3 else LookRequest()  # type: ignore[arg-type]
         try:
-            made = make(templates[category], Wanted(category, {"": wish}), rng)
+            made = make_object(templates[category], ObjectDescription(category, {"": wish}), rng)
         except ManiTwinError:
             continue
         break

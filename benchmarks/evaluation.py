@@ -14,14 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from manitwin.dataset.evaluation.input_likeness import partners
-from manitwin.dataset.evaluation.source_picture import Source, best_outline, look
+from manitwin.dataset.evaluation.input_likeness import draw_partners
+from manitwin.dataset.evaluation.source_picture import Source, best_silhouette_iou, image_feature
 from manitwin.dataset.evaluation.thirty_views import FOV_Y_DEG, thirty_views
-from manitwin.models.embedders.looks import GREY
+from manitwin.models.embedders.appearance import GREY
 from manitwin.render.cameras import framing_camera
 from manitwin.render.renderer import shared_renderer
 from manitwin.twin.loaded_twin import Twin, TwinSource
-from manitwin.twin.shares import wilson_interval
+from manitwin.twin.proportions import wilson_interval
 
 ELEVATIONS_DEG = (15.0, 60.0)
 PICTURE_PX = 320
@@ -52,15 +52,15 @@ def main() -> None:
     every = (source.twin(twin_id) for twin_id in source.twin_ids())
     twins = [twin for twin in every if twin.record.status == "accepted"][: given.most]
     pictures = [picture_of(twin, rng) for twin in twins]
-    looks = np.array([look(each.rgb, each.mask) for each in pictures])  # type: ignore[arg-type]
-    others = partners(pictures, rng)
+    looks = np.array([image_feature(each.rgb, each.mask) for each in pictures])  # type: ignore[arg-type]
+    others = draw_partners(pictures, rng)
     measures: dict[str, list[np.ndarray]] = {"cosine, mean": [], "cosine, best view": [], "silhouette IoU": []}
     for twin in twins:
         views = thirty_views(twin)
-        cosines = np.array([look(view.grey, view.coverage) for view in views]) @ looks.T
+        cosines = np.array([image_feature(view.grey, view.coverage) for view in views]) @ looks.T
         measures["cosine, mean"].append(cosines.mean(0))
         measures["cosine, best view"].append(cosines.max(0))
-        measures["silhouette IoU"].append(np.array([best_outline(each.mask, views)[0] for each in pictures]))  # type: ignore[arg-type]
+        measures["silhouette IoU"].append(np.array([best_silhouette_iou(each.mask, views)[0] for each in pictures]))  # type: ignore[arg-type]
     for name, rows in measures.items():
         values = np.array(rows)
         own, n = np.diag(values), len(values)

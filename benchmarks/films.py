@@ -21,11 +21,11 @@ from manitwin.episodes.collect import batch_folders
 from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episode_pictures import EpisodeFilmsStage
 from manitwin.episodes.episodes_stage import EPISODES
-from manitwin.episodes.film import Film
-from manitwin.episodes.film_encoders import CODECS
 from manitwin.episodes.hdf5_file import EpisodeFile
 from manitwin.episodes.settings import PicturesConfig
-from manitwin.episodes.video import EpisodesVideo
+from manitwin.episodes.video import VideoWriter
+from manitwin.episodes.video_encoders import CODECS
+from manitwin.episodes.video_reading import VideoReader
 from manitwin.robots.load import load_robot
 
 AT_RANDOM = 30
@@ -36,17 +36,17 @@ def row(camera: str, codec: str, pictures: np.ndarray, place: Path) -> str:
     """Write and read a video of pictures ``(N, H, W, 3) uint8``, and return its figures as a row."""
     count, height, width = pictures.shape[:3]
     begun = time.process_time()
-    with EpisodesVideo(place, width_px=width, height_px=height, codec=codec) as video:  # type: ignore[arg-type]
+    with VideoWriter(place, width_px=width, height_px=height, codec=codec) as video:  # type: ignore[arg-type]
         video.add(pictures)
     written = time.process_time()
-    with Film(place) as film:
+    with VideoReader(place) as film:
         squared = [np.mean((read.astype(float) - drawn) ** 2) for read, drawn in zip(film, pictures, strict=True)]
     compared = time.process_time()
-    with Film(place) as film:
+    with VideoReader(place) as film:
         assert sum(1 for _ in film) == count
     read = time.process_time()
     for frame in np.random.default_rng(0).integers(0, count, AT_RANDOM):
-        with Film(place) as film:
+        with VideoReader(place) as film:
             film.picture(int(frame))
     sought = time.process_time()
     decibels = np.mean(10 * np.log10(255**2 / np.array(squared)))
@@ -73,7 +73,7 @@ if __name__ == "__main__":
     begun = time.process_time()
     with EpisodeFile(next(iter(batch_folders(given.episodes))) / EPISODES) as file:
         for episode in file:
-            for shown, pictures in zip(drawn, stage.pictures_of(episode, cameras), strict=True):
+            for shown, pictures in zip(drawn, stage.render_pictures(episode, cameras), strict=True):
                 shown += pictures
     spent = time.process_time() - begun
     print(

@@ -26,12 +26,12 @@ from manitwin.geometry.frames.find import find_frame
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.known import mass_properties
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.ground_truth import mass_properties
 from manitwin.models.generators.templates.known_frames import known_frame
-from manitwin.models.generators.templates.made import Made
-from manitwin.models.generators.templates.making import make
+from manitwin.models.generators.templates.object_sampling import make_object
 from manitwin.models.generators.templates.template import KnownPoint
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.template_object import TemplateObject
 
 BARS = {
     "opening": (0.005, 3.0),
@@ -59,7 +59,7 @@ def main() -> None:
     for category in half:
         for seed in range(arguments.seeds):
             templates = load_templates()
-            made = make(templates[category], read_text(category, templates), np.random.default_rng(seed))
+            made = make_object(templates[category], read_text(category, templates), np.random.default_rng(seed))
             rows, spent = score(made, seed, arguments.kind)
             seconds, asked = seconds + spent, asked + bool(rows)
             for kind, verdict, line, off in rows:
@@ -83,7 +83,7 @@ def main() -> None:
 
 
 def score(
-    made: Made, seed: int, kind: str | None
+    made: TemplateObject, seed: int, kind: str | None
 ) -> tuple[list[tuple[str, str, str, tuple[float, float] | None]], float]:
     """Return kind, verdict, text and error of the frame at each known point, and the CPU seconds."""
     solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
@@ -103,7 +103,9 @@ def score(
     return rows, time.process_time() - started
 
 
-def candidate_of(made: Made, known: KnownPoint, points: np.ndarray, part: np.ndarray, chosen: np.ndarray) -> int:
+def candidate_of(
+    made: TemplateObject, known: KnownPoint, points: np.ndarray, part: np.ndarray, chosen: np.ndarray
+) -> int:
     """Return the nearest candidate on a known point's part, or else the nearest surface sample of the part."""
     mine = np.flatnonzero(part == made.mesh.names.index(known.part))
     own = np.intersect1d(mine, chosen)
@@ -112,7 +114,7 @@ def candidate_of(made: Made, known: KnownPoint, points: np.ndarray, part: np.nda
 
 
 def judged(
-    made: Made, known: KnownPoint, center: np.ndarray, found: object
+    made: TemplateObject, known: KnownPoint, center: np.ndarray, found: object
 ) -> tuple[str, str, tuple[float, float] | None]:
     """Return the verdict on a frame, a text, and its error (m, degrees)."""
     name = f"{known.label} [{known.part}]"

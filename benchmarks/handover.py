@@ -21,9 +21,9 @@ from manitwin.episodes.courses.handover import TAKER
 from manitwin.episodes.episode import run_episode
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.execution import Execution
+from manitwin.episodes.planning.placement_choice import PlacementChoice
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
-from manitwin.episodes.planning.put_down import PutDown
-from manitwin.episodes.planning.two_arms import Take, TwoArmPlanner
+from manitwin.episodes.planning.two_arms import TakePlan, TwoArmPlanner
 from manitwin.episodes.setting import table_setting
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import load_skill
@@ -45,9 +45,9 @@ class Deceived(TwoArmPlanner):
         giver_rad: np.ndarray,
         opening_m: float,
         giver_to_object: np.ndarray,
-        put_down: PutDown,
+        put_down: PlacementChoice,
         first: Sequence[Grasp] = (),
-    ) -> Take | None:
+    ) -> TakePlan | None:
         """Plan for the wrong position when a plan is made anew; None where no plan exists at any such position."""
         for angle in np.arange(0, 2 * np.pi, np.pi / 4) if first else ():
             way = BESIDE_M * np.array([np.cos(angle), np.sin(angle), 0.0])
@@ -85,21 +85,21 @@ class Bench(TwinBench):
             seed,
         )
         planner = self.planners.get(wrong, self.planners[""])
-        close = Execution.close
+        close = Execution.close_hand
         try:
             if wrong == "open":
-                Execution.close = _close_but_the_taker  # type: ignore[method-assign]
+                Execution.close_hand = _close_but_the_taker  # type: ignore[method-assign]
             facts, _ = run_episode(problem, planner, self.robot, EpisodeSettings(), setting.skill_goal)
         finally:
-            Execution.close = close  # type: ignore[method-assign]
+            Execution.close_hand = close  # type: ignore[method-assign]
         return facts, time.process_time() - began
 
 
-_close = Execution.close
+_close = Execution.close_hand
 
 
 def _close_but_the_taker(execution: Execution) -> None:
-    if execution.used != TAKER:
+    if execution.selected_arm != TAKER:
         _close(execution)
 
 

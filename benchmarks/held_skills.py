@@ -25,7 +25,7 @@ from twin_bench import EXECUTED, TwinBench
 from wrong_goals import CONTROLS, pushed_beside, wrong_goal
 
 from manitwin.episodes.episode import run_episode
-from manitwin.episodes.planning.level_space import kept_level
+from manitwin.episodes.planning.level_space import must_stay_level
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.setting import table_setting
@@ -74,7 +74,9 @@ class Bench(TwinBench):
             seed,
             tuple(box for fixture in setting.fixtures for box in fixture.boxes),
             level=frozenset(
-                each.name for each in setting.task.objects if kept_level(each, self.pool.body(each.twin_id).opening)
+                each.name
+                for each in setting.task.objects
+                if must_stay_level(each, self.pool.body(each.twin_id).opening)
             ),
         )
         with pushed_beside(skill_name, wrong, rng):

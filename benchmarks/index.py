@@ -30,7 +30,7 @@ from manitwin.dataset.index.near_duplicates import near_duplicates
 from manitwin.dataset.index.part_list import PartList
 from manitwin.dataset.index.parts import PART_ROWS, write_rows
 from manitwin.dataset.index.query import Index
-from manitwin.dataset.index.tables import DESCRIPTOR_LENGTH, TABLES, joined
+from manitwin.dataset.index.tables import DESCRIPTOR_LENGTH, TABLES, concatenate_tables
 from manitwin.twin.dataset_root import DatasetRoot
 
 CATEGORIES = (
@@ -137,7 +137,7 @@ def write_index(root: DatasetRoot, twins: int, per_twin: int) -> None:
     ids = np.sort(np.array([f"{n:016x}" for n in rng.choice(2**62, twins, replace=False)]))
     parts = []
     for number, chunk in enumerate(np.array_split(ids, max(1, ceil(twins * per_twin / PART_ROWS)))):
-        tables = {name: joined(name, [table]) for name, table in made_rows(chunk, per_twin, rng).items()}
+        tables = {name: concatenate_tables(name, [table]) for name, table in made_rows(chunk, per_twin, rng).items()}
         parts.append(write_rows(root, number, tables))
     PartList(tuple(parts), len(parts)).write(root)
 

@@ -17,7 +17,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from manitwin.geometry.sampling import sample_surface
-from manitwin.models.generators.templates.made import Made
+from manitwin.models.generators.templates.template_object import TemplateObject
 
 NEAR_SHARE = 0.03
 """Accepted distance relative to the longest side. Candidates are about this far apart and rarely lie on a thin rim."""
@@ -67,13 +67,13 @@ _WORKING = ("tip", "lead", "bristles", "head", "jaws", "cap", "outlet", "blade")
 class Known:
     """A built object with samples of its surface: positions ``(N, 3)`` m, normals ``(N, 3)``, and part numbers ``(N,)``."""
 
-    made: Made
+    made: TemplateObject
     positions_m: np.ndarray
     normals: np.ndarray
     part: np.ndarray
 
     @classmethod
-    def of(cls, made: Made) -> Known:
+    def of(cls, made: TemplateObject) -> Known:
         """Sample the surface of an object."""
         solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
         positions, normals, faces = sample_surface(solid, _SAMPLES, np.random.default_rng(0))

@@ -92,7 +92,7 @@ def questions(scenes: Path, rng: np.random.Generator) -> Iterator[tuple[str, flo
             wanted = rng.uniform(*BANDS[1])
             depth_m, mask = behind_board(depth_m, mask, wanted / share, rng)
             share = wanted
-        noisy = DepthNoise().observed(depth_m, rng)
+        noisy = DepthNoise().simulate_depth(depth_m, rng)
         yield thing.twin_id, share, view_of_camera(picture.camera, noisy), mask, world_to_camera @ object_pose(thing)
 
 
@@ -126,7 +126,7 @@ def ask(models: Models, scenes: Path, most: int, wrong: int, seed: int) -> list[
         before = time.process_time()
         found = locate_in_view(view, mask, model)
         row: dict[str, Any] = {"twin": twin_id, "share": share, "cpu_s": time.process_time() - before, "wrong": []}
-        row |= {"status": found.status, "score": found.best_score, "symmetric": len(model.same_poses) > 1}
+        row |= {"status": found.status, "score": found.best_score, "symmetric": len(model.symmetry_poses) > 1}
         if found.poses:
             each = [errors(model, pose.object_to_camera, true) for pose in found.poses]
             right = [adds < RIGHT if row["symmetric"] else add < RIGHT for add, adds in each]
@@ -200,7 +200,7 @@ def ask_ambiguous(count: int) -> list[dict[str, Any]]:
             camera = Camera(look_at(eye, np.zeros(3)), float(np.deg2rad(30)), 320, 320)
             depth, _, face = cast_camera(model.caster, camera)
             knob_px = int((face >= len(mesh.faces) - 12).sum())
-            noisy = DepthNoise().observed(np.where(depth > 0, depth, BACKDROP_M), rng)
+            noisy = DepthNoise().simulate_depth(np.where(depth > 0, depth, BACKDROP_M), rng)
             found = locate_in_view(view_of_camera(camera, noisy), depth > 0, model)
             true = OPENGL_TO_OPENCV @ inverse(camera.camera_to_object)
             apart = [pose_distances_m(model, p.object_to_camera[None], true)[0] / model.diameter_m for p in found.poses]
@@ -209,7 +209,7 @@ def ask_ambiguous(count: int) -> list[dict[str, Any]]:
                     "kind": kind,
                     "seed": seed,
                     "knob_px": knob_px,
-                    "counts": len(model.same_poses) == 1,
+                    "counts": len(model.symmetry_poses) == 1,
                     "status": found.status,
                     "score": found.best_score,
                 }

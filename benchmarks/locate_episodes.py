@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.episodes.courses.course import Ended, Start
+from manitwin.episodes.courses.course import EpisodeEnded, EpisodeStart
 from manitwin.episodes.courses.pick_place import PickPlaceCourse
-from manitwin.episodes.episode import closing_of, settled, tip_poses_of, world_of
+from manitwin.episodes.episode import closing_of, create_world, settle_start, tip_poses_of
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.judging import judge
@@ -44,7 +44,7 @@ from manitwin.scenes.locate.depth_view import view_of_camera
 from manitwin.scenes.locate.estimate import locate_in_view, pose_distances_m
 from manitwin.scenes.locate.located_scene import LocatedScene
 from manitwin.scenes.locate.pose_model import PoseModel
-from manitwin.scenes.locate.recognition import Thing
+from manitwin.scenes.locate.recognition import ViewedObject
 from manitwin.scenes.perception.bop import OPENGL_TO_OPENCV
 from manitwin.scenes.perception.scene_truth import SceneTruth, read_scene_truth
 from manitwin.twin.loaded_twin import Twin, TwinSource
@@ -62,7 +62,7 @@ class AsPlanned(PickPlaceCourse):
         for motion in (plan.carry, plan.lower):
             execution.follow(motion)
             self.check_held(execution)
-        execution.open()
+        execution.open_hand()
         execution.follow(plan.retreat)
 
 
@@ -87,7 +87,7 @@ class Asked:
 def rows_of(asked: Asked, truth: SceneTruth, camera: int, least: float, seed: int) -> list[dict[str, Any]]:
     """Locate the objects of a scene once, try every graspable located one, and return a row for each."""
     picture, rng = truth.pictures[camera % len(truth.pictures)], np.random.default_rng([seed, truth.record.number])
-    view = view_of_camera(picture.camera, DepthNoise().observed(picture.depth_m, rng), picture.rgb)
+    view = view_of_camera(picture.camera, DepthNoise().simulate_depth(picture.depth_m, rng), picture.rgb)
     world_to_camera = OPENGL_TO_OPENCV @ inverse(picture.camera.camera_to_object)
     things, names, rows = [], [], []
     for each in truth.record.objects:
@@ -103,7 +103,7 @@ def rows_of(asked: Asked, truth: SceneTruth, camera: int, least: float, seed: in
             true = world_to_camera @ object_pose(each)
             apart = pose_distances_m(model, location.poses[0].object_to_camera[None], true)[0] / model.diameter_m
             row["right"] = bool(apart < RIGHT)
-            things.append((Thing(mask, location, model, ()), twin))
+            things.append((ViewedObject(mask, location, model, ()), twin))
             names.append(len(rows))
         rows.append(row)
     if not things:
@@ -162,18 +162,18 @@ def tried(
         seed=seed,
     )
     facts, closing = EpisodeFacts(), closing_of(asked.robot, asked.settings)
-    with world_of(actual, asked.robot, asked.settings, closing.force_n) as world:
-        start = settled(actual, asked.planner, asked.settings, None, world)
+    with create_world(actual, asked.robot, asked.settings, closing.force_n) as world:
+        start = settle_start(actual, asked.planner, asked.settings, None, world)
         if start is None:
             return "unsettled"
-        course = AsPlanned(Start(problem, tuple(believed), asked.planner, asked.settings, None), facts)
+        course = AsPlanned(EpisodeStart(problem, tuple(believed), asked.planner, asked.settings, None), facts)
         if not course.plan():
             return "not_planned"
         execution = Execution(world, asked.robot, closing, *tip_poses_of(asked.planner))
         try:
             course.execute(execution)
             judge(start, moved @ start.problem.target.object_to_world, facts, world, execution)
-        except Ended as end:
+        except EpisodeEnded as end:
             facts.outcome = str(end)
         del execution, course
     return facts.outcome

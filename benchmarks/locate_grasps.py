@@ -29,13 +29,13 @@ from manitwin.geometry.poses import inverse
 from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.pipeline.verify import trial_settings
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
-from manitwin.scenes.locate.carried_grasps import carry_grasps
 from manitwin.scenes.locate.depth_view import measured_noise_m
 from manitwin.scenes.locate.estimate import locate_in_view
 from manitwin.scenes.locate.proposals import table_plane
-from manitwin.scenes.locate.recognition import Thing
+from manitwin.scenes.locate.recognition import ViewedObject
+from manitwin.scenes.locate.transferred_grasps import transfer_grasps
 from manitwin.twin.loaded_twin import Twin, TwinSource
-from manitwin.twin.shares import wilson_interval
+from manitwin.twin.proportions import wilson_interval
 
 
 def rows_of(
@@ -63,7 +63,7 @@ def rows_of(
         gripper, verified = load_gripper(twin.record.grasps.gripper), twin.grasps().gripper_to_object  # type: ignore[union-attr]
         model, found = models.of(twin_id), location.poses[0].object_to_camera
         add, adds = errors(model, found, true)
-        row["right"] = bool((adds if len(model.same_poses) > 1 else add) < RIGHT)
+        row["right"] = bool((adds if len(model.symmetry_poses) > 1 else add) < RIGHT)
         true_to_found = inverse(true) @ found
         if location.status == "found":
             some = rng.choice(len(verified), min(count, len(verified)), replace=False)
@@ -74,8 +74,8 @@ def rows_of(
             row["status"] = "no_table"
             continue
         noise_m = measured_noise_m(view, np.ones(view.depth_m.shape, bool))
-        thing = Thing(mask, location, models.of(twin_id), ())
-        carried = carry_grasps(thing, twin, view, plane, noise_m)
+        thing = ViewedObject(mask, location, models.of(twin_id), ())
+        carried = transfer_grasps(thing, twin, view, plane, noise_m)
         if carried is None or not carried.grasps:
             continue
         free = np.array([inverse(true) @ grasp.gripper_to_camera for grasp in carried.grasps[:count]])

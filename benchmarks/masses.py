@@ -14,12 +14,12 @@ import numpy as np
 import trimesh
 
 from manitwin.errors import ManiTwinError
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.rules import estimate_physical
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import Wanted
+from manitwin.models.generators.templates.description_parser import ObjectDescription
+from manitwin.models.generators.templates.object_sampling import make_object
 from manitwin.twin.record_values import Estimate
 
 FACTOR = 1.6
@@ -56,12 +56,14 @@ def made_thing(category: str, seed: int) -> tuple[trimesh.Trimesh, float] | None
 
     Returns None for closed containers, and where the template cannot be made or has no prior.
     """
-    prior = lookup(category)
+    prior = find_prior(category)
     if prior is None or prior.vessel:
         return None
     templates = load_templates()
     try:
-        made = make(templates[category], Wanted(category), np.random.default_rng([seed, *category.encode()]))
+        made = make_object(
+            templates[category], ObjectDescription(category), np.random.default_rng([seed, *category.encode()])
+        )
     except ManiTwinError:
         return None
     return trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False), sum(made.masses_kg.values())
@@ -70,7 +72,7 @@ def made_thing(category: str, seed: int) -> tuple[trimesh.Trimesh, float] | None
 def estimated(category: str, solid: trimesh.Trimesh, *, metric: bool) -> Estimate:
     """Return the mass that the rules estimate."""
     subject = Subject(name=category, solid=solid, parts=(), metric=metric, views=(), cameras=(), seed=0)
-    mass = estimate_physical(subject, lookup(category)).mass_kg
+    mass = estimate_physical(subject, find_prior(category)).mass_kg
     assert mass is not None
     return mass
 

@@ -34,11 +34,11 @@ from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
 from manitwin.models.matting import matte_photo
-from manitwin.models.matting.explained import explained_first
 from manitwin.models.matting.learned import Network, find_networks
-from manitwin.models.matting.matte import MIN_CONFIDENCE, decided
+from manitwin.models.matting.matte import MIN_CONFIDENCE, accept_candidate
 from manitwin.models.matting.study import study_in_turn
-from manitwin.twin.shares import wilson_interval
+from manitwin.models.matting.template_confirmation import prefer_explained
+from manitwin.twin.proportions import wilson_interval
 
 RIGHT_IOU = 0.95
 TILE_PX = 460
@@ -68,10 +68,10 @@ def judge(picture: Composite, networks: Sequence[Network], named: bool) -> Judge
     study = study_in_turn(picture.rgb, networks, min_confidence=MIN_CONFIDENCE)
     explains = template_outline_check(picture.category) if named else None
     if explains is not None and study.confidence < MIN_CONFIDENCE:
-        study = explained_first(picture.rgb, study, explains, min_confidence=MIN_CONFIDENCE)
+        study = prefer_explained(picture.rgb, study, explains, min_confidence=MIN_CONFIDENCE)
     cpu_s = time.process_time() - start
     try:
-        decided(study, "composite")
+        accept_candidate(study, "composite")
         accepted = True
     except Rejected:
         accepted = False

@@ -140,7 +140,9 @@ def report(made: list[Example]) -> tuple[float, np.ndarray]:
         losses[penalty] = float(-np.where(right, np.log(likely), np.log(1 - likely)).mean())
     best = min(losses, key=lambda penalty: losses[penalty])
     print("cross-validated loss by penalty: " + ", ".join(f"{key:g}: {value:.4f}" for key, value in losses.items()))
-    likely = predicted(features, right, groups, best) * np.array([belief.unfitted(values) for values in features])
+    likely = predicted(features, right, groups, best) * np.array(
+        [belief.unfitted_factor(values) for values in features]
+    )
     for source in sorted({each.source for each in made}):
         some = np.flatnonzero([each.source == source for each in made])
         chosen = [some[numbers[some] == number] for number in np.unique(numbers[some])]

@@ -25,7 +25,7 @@ from PIL import Image
 from manitwin.config import NamingConfig, ViewsConfig
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
-from manitwin.models.annotators.likely_names import usual_of
+from manitwin.models.annotators.likely_names import usual_values
 from manitwin.models.annotators.prior_names import named
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.models.classifiers.classifier import LIKELIEST, TEMPERATURE, classify, softmax
@@ -33,9 +33,9 @@ from manitwin.models.classifiers.efficientnet_lite import SIDE_PX, logits
 from manitwin.models.classifiers.imagenet import load_names
 from manitwin.models.classifiers.object_pictures import object_pictures
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import visual_parts
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.object_sampling import make_object
+from manitwin.models.generators.templates.template_object import visual_parts
 from manitwin.models.matting import matte_photo
 from manitwin.pipeline.naming import VIEWS_FROM_ABOVE, cut_view
 from manitwin.pipeline.object_state import pictures
@@ -118,7 +118,7 @@ def looks(seeds: int) -> list[tuple[str, np.ndarray]]:
     templates, rows = load_templates(), []
     for number, category in enumerate(sorted(templates)):
         for seed in range(seeds):
-            made = make(templates[category], read_text(category, templates), np.random.default_rng(1000 + seed))
+            made = make_object(templates[category], read_text(category, templates), np.random.default_rng(1000 + seed))
             rng = np.random.default_rng([number, seed])
             parts = visual_parts(made)
             points = np.concatenate([part.vertices for part in parts])
@@ -228,7 +228,7 @@ def print_sizes(part_of: str, rows: list[tuple[str, np.ndarray]], highest: dict[
         off.append(
             [
                 abs(np.log(said.value / true.typical))
-                for guess in (usual_of(()), usual_of(likely))
+                for guess in (usual_values(()), usual_values(likely))
                 for said, true in (
                     (guess.longest_axis_m, truth.longest_axis_m),
                     (guess.bulk_density_kg_m3, truth.bulk_density_kg_m3),
@@ -265,7 +265,7 @@ def template_meshes(seeds: int) -> Iterator[tuple[str, float, list[np.ndarray]]]
     templates = load_templates()
     for category in sorted(templates):
         for seed in range(seeds):
-            made = make(templates[category], read_text(category, templates), np.random.default_rng(5000 + seed))
+            made = make_object(templates[category], read_text(category, templates), np.random.default_rng(5000 + seed))
             parts = visual_parts(made)
             longest_m = float(np.ptp(np.concatenate([part.vertices for part in parts]), axis=0).max())
             seen = draw_views(parts, ViewsConfig(), RulesAnnotator.picture_px)[1]

@@ -20,14 +20,14 @@ import trimesh
 from points import held_out
 from scipy.spatial import cKDTree
 
-from manitwin.geometry.parts.cut_up import cut_up
+from manitwin.geometry.parts.edge_subdivision import subdivide_long_edges
 from manitwin.geometry.parts.membership import PartRule
-from manitwin.geometry.parts.segmentation import segmented
+from manitwin.geometry.parts.segmentation import segment_by_rule
 from manitwin.geometry.parts.shape import measure_shape
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.object_sampling import make_object
 
 TRUE_ROLES: dict[PartRule, tuple[str, dict[str, str]]] = {
     "handled": ("body", {"handle": "handle", "grips": "handle"}),
@@ -78,7 +78,7 @@ def main() -> None:
     half = [name for name in sorted(load_templates()) if held_out(name) == arguments.held_out]
     ruled = [name for name in half if scored(name)]
     if arguments.rules:
-        ruled = [name for name in ruled if lookup(name).parts in arguments.rules.split(",")]  # type: ignore[union-attr]
+        ruled = [name for name in ruled if find_prior(name).parts in arguments.rules.split(",")]  # type: ignore[union-attr]
     found: dict[bool, list[float | None]] = {False: [], True: []}
     started = time.process_time()
     for category in ruled[:: arguments.every]:
@@ -102,26 +102,26 @@ def main() -> None:
 
 def scored(category: str) -> bool:
     """Tell whether the template's parts have the borders of the rule; a flashlight's head and barrel are one part."""
-    prior, templates = lookup(category), load_templates()
+    prior, templates = find_prior(category), load_templates()
     if prior is None or prior.parts not in TRUE_ROLES:
         return False
     if prior.parts == "sectioned":
         return bool(SECTIONS.get(category))
     rest, roles = TRUE_ROLES[prior.parts]
-    names = make(templates[category], read_text(category, templates), np.random.default_rng(0)).mesh.names
+    names = make_object(templates[category], read_text(category, templates), np.random.default_rng(0)).mesh.names
     return len({roles.get(name, rest) for name in names}) > 1
 
 
 def score(category: str, seed: int, rough: bool) -> float | None:
     """Return the mean IoU of an object's parts, or None where none are recognised."""
-    templates, prior = load_templates(), lookup(category)
+    templates, prior = load_templates(), find_prior(category)
     assert prior is not None and prior.parts is not None
-    made = make(templates[category], read_text(category, templates), np.random.default_rng(seed))
+    made = make_object(templates[category], read_text(category, templates), np.random.default_rng(seed))
     mesh, part = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False), made.mesh.part
     if rough:
         mesh, part = roughened(mesh, part)
     shape = measure_shape(mesh, mesh.center_mass, prior.head_end, prior.stands, np.random.default_rng(seed))
-    told = segmented(mesh, shape, prior.parts)
+    told = segment_by_rule(mesh, shape, prior.parts)
     if told is None:
         return None
     rest, roles = TRUE_ROLES[prior.parts]
@@ -158,7 +158,9 @@ def with_rim(mesh: trimesh.Trimesh, truth: np.ndarray) -> np.ndarray:
     if not len(rim):
         return truth
     reach_m = min(RIM_M, RIM_SHARE * max(float(mesh.extents[2]), float(np.ptp(rim, axis=0)[:2].max()) / 2))
-    vertices, faces, of_face = cut_up(mesh.vertices, mesh.faces, min(reach_m / 3, float(mesh.extents.max()) / 40))
+    vertices, faces, of_face = subdivide_long_edges(
+        mesh.vertices, mesh.faces, min(reach_m / 3, float(mesh.extents.max()) / 40)
+    )
     pieces = trimesh.Trimesh(vertices, faces, process=False)
     centers = np.asarray(pieces.triangles_center)
     within = cKDTree(centers[truth[of_face] == "rim"]).query(centers)[0] <= reach_m
@@ -168,7 +170,7 @@ def with_rim(mesh: trimesh.Trimesh, truth: np.ndarray) -> np.ndarray:
 
 def roughened(mesh: trimesh.Trimesh, part: np.ndarray) -> tuple[trimesh.Trimesh, np.ndarray]:
     """Return a mesh like those of scans and generators, with the part of each face."""
-    vertices, faces, of_face = cut_up(mesh.vertices, mesh.faces, float(mesh.extents.max()) / 40)
+    vertices, faces, of_face = subdivide_long_edges(mesh.vertices, mesh.faces, float(mesh.extents.max()) / 40)
     fine = trimesh.smoothing.filter_taubin(trimesh.Trimesh(vertices, faces, process=False), iterations=15)
     shaken = fine.vertices + np.random.default_rng(0).normal(0, 0.0003, fine.vertices.shape)
     return trimesh.Trimesh(shaken, faces, process=False), part[of_face]

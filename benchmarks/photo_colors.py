@@ -27,10 +27,10 @@ from template_photos import photograph
 
 from manitwin.errors import UsageError
 from manitwin.formats.meshes.textures import linear_to_srgb, srgb_to_linear
-from manitwin.models.annotators.photo_light import light_of_photo
-from manitwin.models.annotators.surface_color import lab_from_srgb, named_colors
+from manitwin.models.annotators.photo_light import estimate_photo_light
+from manitwin.models.annotators.surface_color import lab_from_srgb, name_colors
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.described import Wish
+from manitwin.models.generators.templates.look_phrases import LookRequest
 from manitwin.models.generators.templates.looks import MATERIALS, color_of
 
 MEANS = (0.15, 0.55)
@@ -91,11 +91,11 @@ ENAMELS = ("olive", "brown", "tan", "beige", "cream", "yellow", "orange", "khaki
 def print_metals(only_held_out: bool) -> None:
     """Print how many objects of each material and colour are called gold."""
     wishes = {
-        "gold steel": Wish(rgb=color_of("gold"), material=MATERIALS["steel"]),
-        "brass": Wish(material=MATERIALS["brass"]),
-        "steel": Wish(material=MATERIALS["stainless steel"]),
-        "copper": Wish(material=MATERIALS["copper"]),
-        **{f"{word} enamel": Wish(rgb=color_of(word), material=MATERIALS["enamel"]) for word in ENAMELS},
+        "gold steel": LookRequest(rgb=color_of("gold"), material=MATERIALS["steel"]),
+        "brass": LookRequest(material=MATERIALS["brass"]),
+        "steel": LookRequest(material=MATERIALS["stainless steel"]),
+        "copper": LookRequest(material=MATERIALS["copper"]),
+        **{f"{word} enamel": LookRequest(rgb=color_of(word), material=MATERIALS["enamel"]) for word in ENAMELS},
     }
     for matter, wish in wishes.items():
         gold, total = Counter[bool](), 0
@@ -106,7 +106,7 @@ def print_metals(only_held_out: bool) -> None:
             rgba = np.dstack([as_a_camera_has_it(photo.rgb, rng), np.where(photo.mask, 255, 0).astype(np.uint8)])
             lab = lab_from_srgb(own_pixels(rgba, rng)["light discounted"])
             for metal in (False, True):
-                gold[metal] += named_colors(lab, False, metal_in_a_photo=metal)[0].name == "gold"
+                gold[metal] += name_colors(lab, False, metal_in_a_photo=metal)[0].name == "gold"
             total += 1
         print(f"{matter:14s} called gold: {gold[False]:2d} of {total}, as metal in a photo {gold[True]:2d}", flush=True)
 
@@ -128,7 +128,7 @@ def draw(category: str, word: str, case: int) -> tuple[np.ndarray, dict[str, flo
     rng = np.random.default_rng([case, 1])
     elevation = float(rng.choice([10.0, 30.0, 55.0]))
     try:
-        photo = photograph(category, case, (elevation,), wish=Wish(rgb=rgb))[0]  # type: ignore[arg-type]
+        photo = photograph(category, case, (elevation,), wish=LookRequest(rgb=rgb))[0]  # type: ignore[arg-type]
     except UsageError:
         return None
     looks = [photo.made.looks[photo.made.mesh.names[part]] for part in photo.made.mesh.part]
@@ -153,7 +153,7 @@ def as_a_camera_has_it(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def names_of(rgba: np.ndarray, rng: np.random.Generator) -> dict[str, list[str]]:
     """Return the colour names of the object's pixels, by method of reading them."""
     pixels = own_pixels(rgba, rng)
-    return {way: [color.name for color in named_colors(lab_from_srgb(each), False)] for way, each in pixels.items()}
+    return {way: [color.name for color in name_colors(lab_from_srgb(each), False)] for way, each in pixels.items()}
 
 
 def own_pixels(rgba: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
@@ -161,8 +161,8 @@ def own_pixels(rgba: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarr
     inside = cv2.erode((rgba[..., 3] > 127).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     pixels = rgba[inside][:, :3] / 255
     some = pixels[rng.choice(len(pixels), min(SAMPLES, len(pixels)), replace=False)]
-    light = light_of_photo(rgba)
-    own = some if light is None else light.own_colors(some)
+    light = estimate_photo_light(rgba)
+    own = some if light is None else light.object_colors(some)
     return {"as it is": some, "light discounted": own}
 
 

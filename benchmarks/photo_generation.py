@@ -32,7 +32,7 @@ from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import run_stage
 from manitwin.errors import InputError, Rejected
 from manitwin.geometry.boxes import oriented_bounding_box
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.pipeline.item import Item, twin_id
 from manitwin.pipeline.object_state import load_solid, object_name
@@ -124,7 +124,7 @@ def build(photo: KnownPhoto, category: str, seed: int, path: Path, options: argp
 def _told(draft: Draft[Item], category: str) -> tuple[str, str, bool | None]:
     generation = draft.fields.get("generation", {})
     name = object_name(draft)
-    prior, truth = lookup(name), lookup(category)
+    prior, truth = find_prior(name), find_prior(category)
     right = None if prior is None or truth is None else prior.category == truth.category
     return str(generation.get("notes", {}).get("primitive", "")), name or "", right
 

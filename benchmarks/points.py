@@ -28,11 +28,11 @@ from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
 from manitwin.models.annotators.protocol import PointsRequest, Subject
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.known import mass_properties
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.ground_truth import mass_properties
 from manitwin.models.generators.templates.known_frames import known_frame
-from manitwin.models.generators.templates.made import Made, visual_parts
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.object_sampling import make_object
+from manitwin.models.generators.templates.template_object import TemplateObject, visual_parts
 from manitwin.pipeline.frames import with_frames
 from manitwin.pipeline.refinement import away_from_feature_m, refined_points
 from manitwin.twin.point_records import FunctionalPoint
@@ -94,7 +94,7 @@ def verdicts(category: str, seed: int, plain: bool) -> list[tuple[str, str, bool
     feature.
     """
     templates = load_templates()
-    made = make(templates[category], read_text(category, templates), np.random.default_rng(seed))
+    made = make_object(templates[category], read_text(category, templates), np.random.default_rng(seed))
     solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
     points, normals, faces = sample_surface(solid, SAMPLES, np.random.default_rng(seed))
     if plain:
@@ -126,7 +126,7 @@ def verdicts(category: str, seed: int, plain: bool) -> list[tuple[str, str, bool
     return rows
 
 
-def away_m(made: Made, point: FunctionalPoint, center_of_mass_m: np.ndarray) -> float | None:
+def away_m(made: TemplateObject, point: FunctionalPoint, center_of_mass_m: np.ndarray) -> float | None:
     """Return the distance (m) of a point from the known feature of its label, or None if the template has none."""
     features = [known for known in made.points if known.label == point.label and known.kind not in ("surface", "axis")]
     frames = [known_frame(made, known, center_of_mass_m) for known in features]

@@ -20,7 +20,7 @@ from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.target_grasps import usable_grasps
 from manitwin.robots.load import load_robot, shipped_robots
-from manitwin.scenes.layouts.pool import Pool, pool_of
+from manitwin.scenes.layouts.pool import Pool, cached_pool
 from manitwin.scenes.layouts.surroundings import make_furniture
 from manitwin.scenes.loaded_scene import furniture_boxes
 from manitwin.twin.loaded_twin import Twin, TwinSource
@@ -39,13 +39,17 @@ def shares(robot_name: str, source: TwinSource, pool: Pool, starts: int) -> tupl
             rng = np.random.default_rng([number, start])
             furniture = make_furniture("table", rng)
             task = sample_task(
-                Placeable.of(pool, twin), _nobody, 0, PlacingArea(robot.workspace, furniture.supports[0]), rng
+                Placeable.in_likeliest_placement(pool, twin),
+                _nobody,
+                0,
+                PlacingArea(robot.workspace, furniture.supports[0]),
+                rng,
             )
             if task is None or not grasps:
                 continue
             boxes = tuple(furniture_boxes(furniture))
             problem = PickPlaceProblem(task.objects[0], task.goal_object_to_world, grasps, (), boxes, seed=start)
-            reached.append(planner.reachable(problem))
+            reached.append(planner.reachable_share(problem))
             looked_at += len(grasps)
         if not any(reached):
             without.append(twin.category)
@@ -64,7 +68,7 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=2)
     parser.add_argument("--robots", nargs="+", default=list(shipped_robots()))
     asked = parser.parse_args()
-    source, pool = TwinSource(str(asked.twins.resolve())), pool_of(str(asked.twins.resolve()))
+    source, pool = TwinSource(str(asked.twins.resolve())), cached_pool(str(asked.twins.resolve()))
     for name in asked.robots:
         looked_at, found, without, spent_s = shares(name, source, pool, asked.starts)
         said = f"; none of: {', '.join(without)}" if without else ""

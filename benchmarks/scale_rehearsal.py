@@ -26,7 +26,7 @@ from engine import TESTS, resident_mb
 from manitwin.config import Resource, RunConfig
 from manitwin.engine.driver import Driver
 from manitwin.engine.events import ItemEnded
-from manitwin.engine.jobs import Finish, Job, Reply, RunStage, Survey, Surveyed
+from manitwin.engine.jobs import Finish, Job, Reply, RunStage, Survey, SurveyReply
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.recipe import Ending
 from manitwin.engine.stage import StagePart
@@ -101,7 +101,7 @@ class RecordedPool:
 
     def _answer(self, job: Job) -> tuple[float, Reply]:
         if isinstance(job, Survey):
-            return SURVEY_S, Surveyed(f"{job.task.number:016x}", "mesh")
+            return SURVEY_S, SurveyReply(f"{job.task.number:016x}", "mesh")
         if isinstance(job, RunStage):
             cost = self._runs[job.task.number % len(self._runs)].stages.get(job.stage, StageCost(0.0, 0.0, 0.0))
             return cost.cpu_seconds, StageRun(KEY, cost, False)

@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.dataset.index.query import Index
-from manitwin.dataset.search.search import BEST_VIEWS, likeness
-from manitwin.dataset.search.twin_looks import twin_looks
+from manitwin.dataset.search.appearance_vectors import load_appearance_vectors
+from manitwin.dataset.search.search import BEST_VIEWS, view_similarity
+from manitwin.models.embedders.appearance import COLOR_WEIGHT, NETWORK, appearance_descriptor
 from manitwin.models.embedders.foreground import foreground
-from manitwin.models.embedders.looks import COLOR_WEIGHT, NETWORK, look_of
 from manitwin.scenes.perception.scene_truth import read_scene_truth
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -77,7 +77,7 @@ def main() -> None:
     root = DatasetRoot(given.dataset)
     rows = Index(root).select("twins", columns=["twin_id", "revision"]).to_pylist()
     before = time.process_time()
-    looks = dict(twin_looks(root, {row["twin_id"]: row["revision"] for row in rows}))
+    looks = dict(load_appearance_vectors(root, {row["twin_id"]: row["revision"] for row in rows}))
     ids = list(looks)
     print(
         f"{len(ids)} twins: {(time.process_time() - before) / len(ids):.2f} CPU-s a twin for looks that were not kept"
@@ -88,12 +88,12 @@ def main() -> None:
         visible = np.array([share for _, share, *_ in asked])
         for kind, pictures in (("mask", [each[2] for each in asked]), ("box", [each[3] for each in asked])):
             before = time.process_time()
-            found = np.array([look_of(*foreground(pixels)[:2]) for pixels in pictures])
+            found = np.array([appearance_descriptor(*foreground(pixels)[:2]) for pixels in pictures])
             spent = (time.process_time() - before) / len(pictures)
             for weight in (COLOR_WEIGHT, *((0.0, 0.1, 0.2, 0.5, 1.0) if given.grid else ())):
                 moved = {twin_id: reweighted(looks[twin_id], weight) for twin_id in ids}
                 scores = np.array(
-                    [[likeness(look, moved[twin_id]) for twin_id in ids] for look in reweighted(found, weight)]
+                    [[view_similarity(look, moved[twin_id]) for twin_id in ids] for look in reweighted(found, weight)]
                 )
                 ranks = (scores > scores[np.arange(len(places)), places][:, None]).sum(1)
                 report(f"{scenes.name} {kind} {weight:g}", ranks, visible)

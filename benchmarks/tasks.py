@@ -38,17 +38,17 @@ from manitwin.episodes.recording import Recording
 from manitwin.episodes.settings import TasksConfig, TrajectoriesConfig
 from manitwin.episodes.target_grasps import usable_grasps
 from manitwin.episodes.tasks.candidates import Candidate, single_actions
-from manitwin.episodes.tasks.checking import NoTask, check
+from manitwin.episodes.tasks.feasibility_check import InfeasibleTask, check_candidate
 from manitwin.episodes.tasks.task_files import TASKS, read_tasks, write_tasks
 from manitwin.episodes.tasks.task_record import TaskRecord
 from manitwin.episodes.tasks.task_scene import TaskScene
 from manitwin.episodes.tasks.tasks_run import make_tasks
 from manitwin.robots.load import load_robot
-from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.layouts.pool import cached_pool
 from manitwin.scenes.loaded_scene import Scene
 from manitwin.scenes.scene_files import scene_ids, scene_name
 from manitwin.twin.loaded_twin import TwinSource
-from manitwin.twin.shares import wilson_interval
+from manitwin.twin.proportions import wilson_interval
 
 SPARE = 2.0  # factor of tasks made per task drawn: rare kinds are not in every scene
 TWO_LITERAL_SHARE = 0.25
@@ -80,20 +80,20 @@ def share(name: str, right: int, of: int, rest: str = "") -> str:
 
 def plannable_of(scenes: Path, robot_name: str, seed: int, scene_id: str) -> tuple[Counter[str], Counter[str]]:
     """Return how many candidates with one literal a scene has of each kind, and how many of these can be planned."""
-    source, robot, settings = EpisodesSource.of(scenes, None), load_robot(robot_name), TasksConfig(seed=seed)
+    source, robot, settings = EpisodesSource.detect(scenes, None), load_robot(robot_name), TasksConfig(seed=seed)
     twins, planner = TwinSource(source.dataset), planner_of(robot, settings.episode.timestep_s)
     loaded = Scene.read(scenes / scene_name(scene_id), source.dataset)
     grasps = cache(lambda twin_id: usable_grasps(twins.twin(twin_id), robot.gripper))
     scene, rng = (
-        TaskScene(loaded, pool_of(source.dataset), robot, grasps),
+        TaskScene(loaded, cached_pool(source.dataset), robot, grasps),
         np.random.default_rng([seed, crc32(scene_id.encode())]),
     )
     candidates, plannable = Counter[str](), Counter[str]()
     for action in single_actions(scene, Counter()):
         candidates[action.kind] += 1
         try:
-            check(scene, Candidate((action,)), planner, settings.episode, int(rng.integers(1 << 62)))
-        except NoTask:
+            check_candidate(scene, Candidate((action,)), planner, settings.episode, int(rng.integers(1 << 62)))
+        except InfeasibleTask:
             continue
         plannable[action.kind] += 1
     return candidates, plannable

@@ -11,10 +11,10 @@ import trimesh
 
 from manitwin.geometry.poses import transform
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.described import Wish
-from manitwin.models.generators.templates.made import Made, visual_parts
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import Wanted
+from manitwin.models.generators.templates.description_parser import ObjectDescription
+from manitwin.models.generators.templates.look_phrases import LookRequest
+from manitwin.models.generators.templates.object_sampling import make_object
+from manitwin.models.generators.templates.template_object import TemplateObject, visual_parts
 from manitwin.render.cameras import Camera, framing_camera
 from manitwin.render.procedural_textures import procedural_texture, textured_box
 from manitwin.render.scene_lighting import DirectionalLight, Lighting
@@ -54,7 +54,7 @@ class TemplatePhoto:
 
     rgb: np.ndarray
     mask: np.ndarray
-    made: Made
+    made: TemplateObject
     camera: Camera
     elevation_deg: float
     azimuth_deg: float
@@ -72,14 +72,14 @@ def photograph(
     elevations_deg: Sequence[float] = ELEVATIONS_DEG,
     *,
     turns_deg: Sequence[float] = (0.0,),
-    wish: Wish | None = None,
+    wish: LookRequest | None = None,
 ) -> list[TemplatePhoto]:
     """Photograph one object of a category from each elevation and each turn about the vertical; the seed determines the rest.
 
     ``wish`` is the colour or material of the whole object; raises UsageError where it cannot be made so.
     """
     rng = np.random.default_rng([seed, *category.encode()])
-    made = make(load_templates()[category], Wanted(category, {} if wish is None else {"": wish}), rng)
+    made = make_object(load_templates()[category], ObjectDescription(category, {} if wish is None else {"": wish}), rng)
     shots = photographed(visual_parts(made), rng, elevations_deg, turns_deg=turns_deg)
     return [TemplatePhoto(shot.rgb, shot.mask, made, shot.camera, *shot.seen_from, shot.ground) for shot in shots]
 

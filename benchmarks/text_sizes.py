@@ -16,7 +16,7 @@ import numpy as np
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import load_priors
-from manitwin.models.generators.lift.made_text import made_as_read
+from manitwin.models.generators.lift.text_generation import make_from_text
 from manitwin.models.generators.templates.catalog import load_templates
 
 OTHER_SEED, MOST_LARGER = 77, 0.12
@@ -32,7 +32,7 @@ def main() -> None:
     refused: dict[int, list[str]] = {2: [], 3: []}
     off, costs = [0.0], []
     for category in load_templates():
-        other = np.ptp(made_as_read(f"a {category}", OTHER_SEED)[0].mesh.vertices, axis=0)
+        other = np.ptp(make_from_text(f"a {category}", OTHER_SEED)[0].mesh.vertices, axis=0)
         x, y, z = np.round(100 * other * np.exp(rng.uniform(-MOST_LARGER, MOST_LARGER)), 2)
         long, wide = max(x, y), min(x, y)
         for sides, text in (
@@ -41,7 +41,7 @@ def main() -> None:
         ):
             begun = time.process_time()
             try:
-                extents = 100 * np.ptp(made_as_read(text, given.seed)[0].mesh.vertices, axis=0)
+                extents = 100 * np.ptp(make_from_text(text, given.seed)[0].mesh.vertices, axis=0)
             except UsageError:
                 refused[len(sides)].append(category)
                 continue
@@ -55,7 +55,7 @@ def main() -> None:
     held = 0
     for category in vessels:
         try:
-            made_as_read(f"a {category} of {given.volume}", given.seed)
+            make_from_text(f"a {category} of {given.volume}", given.seed)
         except UsageError as error:
             print(error)
         else:

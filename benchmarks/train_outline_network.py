@@ -30,7 +30,7 @@ from manitwin.models.matting.outline_network import (
     AROUND_PX,
     NEAR_PX,
     VALUES,
-    BothSides,
+    OutlineColours,
     patch_windows,
     patches,
 )
@@ -84,7 +84,7 @@ def _near_outline(
     if mask.sum() < LEAST_PIXELS:
         return []
     rough = cv2.resize(mask.astype(np.float32), truth.shape[::-1], interpolation=cv2.INTER_LINEAR)
-    sides = BothSides(rgb, rough, band_px(truth.shape, mask.shape))
+    sides = OutlineColours(rgb, rough, band_px(truth.shape, mask.shape))
     rows, columns = np.nonzero(sides.near)
     some = rng.choice(len(rows), min(len(rows), PATCHES_OF_A_MASK), replace=False)
     rows, columns = rows[some], columns[some]

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from manitwin.episodes.attempts import EXECUTION_FAILURES
 from manitwin.episodes.pick_place_tasks import Placeable
-from manitwin.episodes.room_for_hand import begins_that_lead_there
+from manitwin.episodes.room_for_hand import feasible_start_placements
 from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.target_grasps import usable_grasps
 from manitwin.robots.load import load_robot
-from manitwin.scenes.layouts.pool import PoolTwin, StandingPose, pool_of
+from manitwin.scenes.layouts.pool import PoolTwin, StandingPose, cached_pool
 from manitwin.twin.loaded_twin import TwinSource
 
 EXECUTED = {"kept", "unplanned_contact", "disturbed", *EXECUTION_FAILURES}
@@ -21,11 +21,11 @@ class TwinBench:
 
     def __init__(self, dataset: str, robot: str):
         """Read the pool of twins."""
-        self.pool, self.source, self.robot = pool_of(dataset), TwinSource(dataset), load_robot(robot)
+        self.pool, self.source, self.robot = cached_pool(dataset), TwinSource(dataset), load_robot(robot)
 
     def begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
         """Return the placements from which a target may start with a skill, as far as its grasps and the table determine."""
-        return begins_that_lead_there(
+        return feasible_start_placements(
             skill,
             target,
             self.pool.body(target.twin_id).body,
@@ -35,4 +35,4 @@ class TwinBench:
 
     def placeable(self, twin: PoolTwin) -> Placeable:
         """Return how a twin may be placed on a table."""
-        return Placeable.of(self.pool, twin)
+        return Placeable.in_likeliest_placement(self.pool, twin)

@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 from manitwin.scenes.scene_files import dataset_of, scene_files
 from manitwin.scenes.vqa.blind import blind_scores
 from manitwin.scenes.vqa.question import YES_NO, Question
-from manitwin.scenes.vqa.write import ask_scenes
+from manitwin.scenes.vqa.write import generate_questions
 from scene_answers import rederived
 from second_scene import SecondScene, SecondView
 
@@ -39,7 +39,7 @@ def main() -> None:
     sets = []
     for place in (asked.scenes, asked.other_scenes):
         files, start = scene_files(place), time.process_time()
-        questions, _ = ask_scenes(files, dataset=asked.twins, per_scene=asked.per_scene, validation_share=0.0)
+        questions, _ = generate_questions(files, dataset=asked.twins, per_scene=asked.per_scene, validation_share=0.0)
         cpu_s = time.process_time() - start
         print(f"{place}: {len(files)} scenes, {len(questions)} questions, {cpu_s / len(files):.2f} CPU-s a scene")
         sets.append(questions)

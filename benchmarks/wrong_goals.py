@@ -9,7 +9,7 @@ from unittest import mock
 
 import numpy as np
 
-from manitwin.episodes.courses.course import Start
+from manitwin.episodes.courses.course import EpisodeStart
 from manitwin.episodes.courses.push import PushCourse
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.planning.closed_hand import first_corner
@@ -90,7 +90,7 @@ def pushed_beside(skill: str, kind: str, rng: np.random.Generator) -> AbstractCo
         return nullcontext()
     way, begin = _beside_m(FAR_M, rng), PushCourse.__init__
 
-    def astray(course: PushCourse, start: Start, facts: EpisodeFacts) -> None:
+    def astray(course: PushCourse, start: EpisodeStart, facts: EpisodeFacts) -> None:
         begin(course, start, facts)
         course._place_m = course._place_m + way  # the guards too, or a stroke across the true mark would end there
 

@@ -26,7 +26,7 @@ from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.video import write_animation
 from manitwin.render.false_colors import depth_in_colors, depth_range_m, ids_in_colors
 from manitwin.robots.load import load_robot
-from manitwin.scenes.furniture_pictures import lighting_of
+from manitwin.scenes.furniture_pictures import render_lighting
 from manitwin.scenes.layouts.layouts_run import make_layouts
 from manitwin.scenes.layouts.previews import scene_pictures
 from manitwin.scenes.scene import Furniture, Light
@@ -74,7 +74,9 @@ def pictures(episode: StoredEpisode, twins: Path, size_px: int) -> list[list[np.
     """Return all frames of an episode from each camera."""
     robot, source = load_robot(episode.robot.name), TwinSource(twins)
     visuals = [twin_drawable(source.folder(thing.twin_id)) for thing in episode.objects]
-    lighting = lighting_of(tuple(episode.facts["ambient"]), tuple(Light(**each) for each in episode.facts["lights"]))
+    lighting = render_lighting(
+        tuple(episode.facts["ambient"]), tuple(Light(**each) for each in episode.facts["lights"])
+    )
     with EpisodeReplay(
         robot, visuals, furniture=Furniture(**episode.facts["furniture"]), lighting=lighting, seed=1
     ) as replay:

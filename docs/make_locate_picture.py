@@ -35,7 +35,7 @@ def answers(dataset: Path, scenes: Path) -> Iterator[tuple[float, Location, np.n
     for file in sorted(scenes.glob("scenes/*/*/scene.json")):
         truth = read_scene_truth(file)
         for picture in truth.pictures:
-            view = view_of_camera(picture.camera, DepthNoise().observed(picture.depth_m, rng), picture.rgb)
+            view = view_of_camera(picture.camera, DepthNoise().simulate_depth(picture.depth_m, rng), picture.rgb)
             for thing in truth.record.objects:
                 mask = picture.ids == truth.ids[thing.name]
                 if mask.sum() < LEAST_PX:

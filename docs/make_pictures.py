@@ -17,7 +17,7 @@ from picture_file import of_twin, save_picture
 from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 import manitwin
-from manitwin.cli.annotator_questions import questions_about
+from manitwin.cli.annotator_questions import list_annotator_questions
 from manitwin.config import BuildConfig
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.boxes import smallest_enclosing_circle
@@ -25,7 +25,7 @@ from manitwin.geometry.poses import OBJECT_TO_GLTF, rotation_between, transform,
 from manitwin.models.vlm.protocol import Picture as ChatPicture
 from manitwin.render.cameras import Camera, framing_camera, project
 from manitwin.render.card_panels import gripper_body
-from manitwin.render.raycast import merged
+from manitwin.render.raycast import merge_parts
 from manitwin.render.renderer import shared_renderer
 from manitwin.render.surfaces import plain_part
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
@@ -73,7 +73,7 @@ def mug() -> list[trimesh.Trimesh]:
     handle.apply_transform(transform(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]), np.array([0.041, 0, 0.05])))
     keep = handle.triangles_center[:, 0] > 0.0385
     handle = trimesh.Trimesh(handle.vertices, handle.faces[keep], process=False)
-    return [plain_part(merged([body, handle]), (238, 236, 230), roughness=0.4)]
+    return [plain_part(merge_parts([body, handle]), (238, 236, 230), roughness=0.4)]
 
 
 def axes(frame_to_object: np.ndarray, length: float) -> list[trimesh.Trimesh]:
@@ -84,7 +84,7 @@ def axes(frame_to_object: np.ndarray, length: float) -> list[trimesh.Trimesh]:
         shaft.apply_translation([0, 0, length * 0.42])
         head = trimesh.creation.cone(0.0036, length * 0.18, sections=32)
         head.apply_translation([0, 0, length * 0.82])
-        arrow = merged([shaft, head])
+        arrow = merge_parts([shaft, head])
         arrow.apply_transform(frame_to_object @ transform(rotation_between(np.eye(3)[2], np.eye(3)[axis])))
         result.append(plain_part(arrow, color, roughness=0.8))
     return result
@@ -134,7 +134,7 @@ def _note(draw: ImageDraw.ImageDraw, at: tuple[float, float], corner: tuple[int,
 def frames_picture() -> Image.Image:
     """Draw all frames on the mug."""
     parts, gripper = mug(), load_gripper("panda")
-    whole = merged(parts)
+    whole = merge_parts(parts)
     gripper_to_object, width_m = rim_grasp(gripper, whole.extents, whole)
     hand = gripper_body(gripper.boxes(width_m + 0.012)).apply_transform(gripper_to_object)
     center, radius = smallest_enclosing_circle(np.asarray(whole.vertices)[:, :2])
@@ -188,7 +188,7 @@ def _gltf_inset(draw: ImageDraw.ImageDraw, camera: Camera) -> None:
 def grippers_picture() -> Image.Image:
     """Draw every shipped gripper holding the mug, at one scale."""
     parts = mug()
-    whole = merged(parts)
+    whole = merge_parts(parts)
     drawn = [(name, _held(load_gripper(name), whole)) for name in shipped_grippers()]
     corners = [hand.vertices for _, hands in drawn for hand in hands]
     camera = framing_camera(
@@ -252,7 +252,7 @@ def _held_in_hand(
             )
             lifted = transform(translation=np.array([0, 0, height / 2]))
             fingers[finger + 1].append(part.apply_transform(lifted @ pose @ link_to_gripper @ shape.shape_to_link))
-    return [merged(some) for some in fingers]
+    return [merge_parts(some) for some in fingers]
 
 
 def cards_picture(twins: list[manitwin.Twin]) -> Image.Image:
@@ -281,7 +281,7 @@ def questions_picture() -> Image.Image:
     """Show the pictures from which a model chooses grasp points on the sample mug: clean, marked, and with rearranged markers."""
     with tempfile.TemporaryDirectory() as folder:
         report = manitwin.build(MUG, folder, name="mug", quick=True)
-        asked = questions_about(report.results[0].folder or Path(), BuildConfig(), "openai:MODEL")
+        asked = list_annotator_questions(report.results[0].folder or Path(), BuildConfig(), "openai:MODEL")
     shown = []
     for number, picture in (
         (4, 0),

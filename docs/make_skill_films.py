@@ -35,7 +35,7 @@ from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import StaticBox
 from manitwin.render.cameras import look_at
 from manitwin.robots.load import load_robot
-from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.layouts.pool import cached_pool
 from manitwin.scenes.scene import Furniture
 from manitwin.twin.loaded_twin import TwinSource
 
@@ -63,7 +63,7 @@ LEAST_WAY_M, WAY_SHARE = 0.45, 1.5  # minimum distance of the camera, and its ra
 def an_episode(twins: Path, skill: str) -> StoredEpisode:
     """Record episodes of a skill with successive seeds until one is kept; raises LookupError if none is."""
     wanted = TARGETS.get(skill)
-    count = ATTEMPTS if wanted is None else len(pool_of(str(twins)).twins)
+    count = ATTEMPTS if wanted is None else len(cached_pool(str(twins)).twins)
     for number in range(TRIES):
         with tempfile.TemporaryDirectory() as folder:
             config = TrajectoriesConfig(seed=SEED + number, skill=skill, batch=count)

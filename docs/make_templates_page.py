@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.description_parser import DIRECTIONS, ObjectDescription
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS, SAME_MATERIAL, SHADES
-from manitwin.models.generators.templates.made import Made
-from manitwin.models.generators.templates.making import make
+from manitwin.models.generators.templates.object_sampling import make_object
 from manitwin.models.generators.templates.template import Template
-from manitwin.models.generators.templates.text import DIRECTIONS, Wanted
+from manitwin.models.generators.templates.template_object import TemplateObject
 from manitwin.models.generators.templates.vocabulary import RELATIVE
 
 PAGE = Path(__file__).parent / "templates.md"
@@ -179,12 +179,12 @@ This page is written by `python docs/make_templates_page.py`, its picture by `py
 """
 
 
-def first_thing(template: Template) -> Made:
+def first_thing(template: Template) -> TemplateObject:
     """Return the thing that seed 0 makes."""
-    return make(template, Wanted(template.category), np.random.default_rng(0))
+    return make_object(template, ObjectDescription(template.category), np.random.default_rng(0))
 
 
-def row(template: Template, made: Made) -> str:
+def row(template: Template, made: TemplateObject) -> str:
     """Return the row of one template: its names, the parts of a thing that it made, and what is known of it."""
     points = ", ".join(dict.fromkeys(point.label for point in made.points))
     alone = (f"{name} (alone)" for name in template.bare)
@@ -192,7 +192,7 @@ def row(template: Template, made: Made) -> str:
     return f"| {names} | {', '.join(made.mesh.names)} | {points} |"
 
 
-def page(thing_of: Callable[[Template], Made] = first_thing) -> str:
+def page(thing_of: Callable[[Template], TemplateObject] = first_thing) -> str:
     """Return the page, of a thing of each template."""
     templates = load_templates().values()
     parts = [INTRODUCTION]

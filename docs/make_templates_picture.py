@@ -11,9 +11,9 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import visual_parts
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import Wanted
+from manitwin.models.generators.templates.description_parser import ObjectDescription
+from manitwin.models.generators.templates.object_sampling import make_object
+from manitwin.models.generators.templates.template_object import visual_parts
 from manitwin.render.cameras import hero_camera
 from manitwin.render.renderer import shared_renderer
 
@@ -30,7 +30,7 @@ def templates_picture() -> Image.Image:
     picture = Image.new("RGB", (COLUMNS * TILE_PX, rows * (TILE_PX + LABEL_PX)), "white")
     draw, font = ImageDraw.Draw(picture), ImageFont.load_default(FONT_PX)
     for number, (category, template) in enumerate(templates.items()):
-        parts = visual_parts(make(template, Wanted(category), np.random.default_rng(SEED)))
+        parts = visual_parts(make_object(template, ObjectDescription(category), np.random.default_rng(SEED)))
         points = np.concatenate([part.vertices for part in parts])
         camera = hero_camera(points, fov_y_deg=FOV_Y_DEG, width_px=TILE_PX, height_px=TILE_PX)
         drawn = shared_renderer().render(parts, [camera], background=(255, 255, 255))[0].rgb

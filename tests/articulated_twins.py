@@ -13,7 +13,7 @@ import exported_twins
 from manitwin.formats.glb import read_glb
 from manitwin.formats.npy_file import labels_to_npy
 from manitwin.twin.link_records import FACE_LINKS
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 
 NAMES = ("head", "handle", "knob")
 MASSES_KG = (0.2, 0.12, 0.05)
@@ -59,5 +59,5 @@ def write_articulated(folder: Path, **changes: Any) -> Path:
     record = json.loads((folder / RECORD).read_text())
     for sealed in ("files", "revision"):
         del record[sealed]
-    seal(folder, {**record, "links": links(faces), "joints": list(JOINTS), **changes})
+    write_twin_record(folder, {**record, "links": links(faces), "joints": list(JOINTS), **changes})
     return folder

@@ -17,11 +17,11 @@ import typer.testing
 
 import manitwin.cli.main
 from manitwin.cli.console import out_console
-from manitwin.engine.process_bounds import one_thread_each
+from manitwin.engine.process_limits import limit_library_threads
 from manitwin.errors import RendererMissing
 from manitwin.render.device import require_renderer
 
-one_thread_each()  # before NumPy is loaded: tests run side by side, and threads of theirs would wait for each other
+limit_library_threads()  # before NumPy is loaded: tests run side by side, and threads of theirs would wait for each other
 
 SHARED_DATA = Path(__file__).resolve().parent.parent.parent / "shared" / "data"
 

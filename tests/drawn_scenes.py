@@ -24,7 +24,7 @@ from manitwin.scenes.scene_files import CONFIG, read_scene, scene_files, scene_n
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import FACE_PARTS
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from scene_twins import bowl, can, slab, write_thing
 
 SIZE_PX = 128
@@ -75,7 +75,7 @@ def add_parts(folder: Path, names: tuple[str, str]) -> None:
         for place, name in enumerate(names)
     ]  # fmt: skip
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
 
 
 def _record(number: int, places: dict[str, tuple[float, float, float]], twins: dict[str, str]) -> SceneRecord:

@@ -18,7 +18,7 @@ from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.store import seal
+from manitwin.twin.store import write_twin_record
 from record_overlay import overlaid
 from rehearsal_cube import CUBE
 from twin_folders import grasp_table
@@ -70,7 +70,7 @@ def write_twin(folder: Path, **changes: Any) -> Path:
     (folder / "visual.glb").write_bytes(write_glb(visual_parts()))
     pyarrow.parquet.write_table(grasp_table(1, 8), folder / "grasps.parquet")
     (folder / "source.obj").write_bytes(b"a made source\n")
-    seal(folder, overlaid(_record(), changes))
+    write_twin_record(folder, overlaid(_record(), changes))
     return folder
 
 
@@ -80,7 +80,7 @@ def write_rejected(folder: Path) -> Path:
     (folder / "source.obj").write_bytes(b"two things\n")
     kept = {k: v for k, v in _record().items() if k not in CUBE}
     rejection = {"stage": "gate", "reason": "several_objects", "detail": "two objects"}
-    seal(folder, {**kept, "twin_id": "0" * 16, "status": "rejected", "rejection": rejection})
+    write_twin_record(folder, {**kept, "twin_id": "0" * 16, "status": "rejected", "rejection": rejection})
     return folder
 
 

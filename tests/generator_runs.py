@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from manitwin.config import BuildConfig
-from manitwin.engine.charges import counted
+from manitwin.engine.charges import record_charges
 from manitwin.engine.job_memory import JobMemory, RootJobMemory
 from manitwin.models.generators.protocol import Generated, GenerationRequest, Generator, JobState
 from manitwin.models.generators.run import run_generator
@@ -68,7 +68,7 @@ def run(
     waits = [] if waits is None else waits
     folder.mkdir(parents=True, exist_ok=True)
     made, error = None, None
-    with counted() as bill:
+    with record_charges() as bill:
         try:
             made = run_generator(
                 generator,

@@ -14,7 +14,7 @@ from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.grasp_table import JOINTS, SCHEMA
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from rigid_boxes import FROM_ABOVE, PANDA, above
 from scene_twins import Thing, slab, write_thing
 from twin_folders import tried_as_built
@@ -85,5 +85,5 @@ def write_held(
     told = {"gripper": gripper, "gripper_sha256": load_gripper(gripper).sha256, "trial": tried_as_built()}
     record["grasps"] |= told
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
     return identity

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from manitwin.models.generators.lift import made_photo, nameless
+from manitwin.models.generators.lift import photo_generation, unnamed_shape
 
 
 @contextmanager
 def kept_solids() -> Iterator[None]:
     """Fit them once to each picture, for each hint and lens, in the ``with`` statement."""
     with pytest.MonkeyPatch.context() as patch:
-        for module, name in ((made_photo, "plain_solids"), (nameless, "turned_solid")):
+        for module, name in ((photo_generation, "plain_solids"), (unnamed_shape, "turned_solid")):
             patch.setattr(module, name, _kept(getattr(module, name)))
         yield
 

@@ -37,15 +37,23 @@ from manitwin.config import Resource
 from manitwin.engine.charges import charge
 from manitwin.engine.folder_recipe import FolderRecipe
 from manitwin.engine.recipe import Ending, Identity, Tables
-from manitwin.engine.stage import Draft, Stage, tell_part
+from manitwin.engine.stage import Draft, Stage, report_progress
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import AccessDenied, RateLimited, Rejected, Unavailable
 from manitwin.pipeline.item import Item
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
+from manitwin.twin.integrity import find_size_damage, write_sizes
 from manitwin.twin.migration import SCHEMA_VERSION
 from manitwin.twin.record import TwinRecord
-from manitwin.twin.store import RECORD, RUN, canonical_json, parse_record, seal, sha256_of_json, write_bytes_atomically
-from manitwin.twin.wholeness import note_sizes, size_damage
+from manitwin.twin.store import (
+    RECORD,
+    RUN,
+    canonical_json,
+    parse_record,
+    sha256_of_json,
+    write_bytes_atomically,
+    write_twin_record,
+)
 from rehearsal_cube import CUBE, cube_files
 
 
@@ -102,7 +110,7 @@ class RehearsedStage:
         if what == "sleep":
             time.sleep(float(more))
         if what == "parts":
-            tell_part(1, 2, "things")
+            report_progress(1, 2, "things")
         while what in ("wait", "parts") and not Path(more).exists():
             time.sleep(0.02)
         if what == "hang":
@@ -177,7 +185,7 @@ class RehearsalRecipe(FolderRecipe[TwinRecord]):
 
     def damage(self, root: DatasetRoot, item_id: str) -> str | None:
         """Return what is wrong with a twin's folder by the sizes of its files."""
-        return size_damage(root, twin_name(item_id))
+        return find_size_damage(root, twin_name(item_id))
 
     def parse(self, record: bytes) -> TwinRecord:
         """Read a twin's record."""
@@ -209,8 +217,8 @@ class RehearsalRecipe(FolderRecipe[TwinRecord]):
         if rejected is None:
             for name, file in self.files.items():
                 (fresh / name).write_bytes(file)
-        sealed = seal(fresh, rehearsed_record(draft, self.sha256, rejected))
-        note_sizes(fresh)
+        sealed = write_twin_record(fresh, rehearsed_record(draft, self.sha256, rejected))
+        write_sizes(fresh)
         return sealed
 
 

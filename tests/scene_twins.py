@@ -15,7 +15,7 @@ from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 from manitwin.scenes.loaded_scene import Scene
-from manitwin.twin.store import RECORD, read_record, seal
+from manitwin.twin.store import RECORD, read_record, write_twin_record
 from rigid_boxes import block
 from twin_folders import twin_id, write_accepted
 
@@ -128,7 +128,7 @@ def write_thing(root: Path, number: int, thing: Thing) -> str:
         },
     ]  # fmt: skip
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
     read_record(folder, verify=True)
     return identity
 

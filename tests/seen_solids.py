@@ -69,5 +69,5 @@ def seen_from(
         board = np.arange(240)[None] > edge
         depth = np.where(board, 0.6, depth)
         mask = mask & ~board
-    told = DepthNoise().observed(depth, np.random.default_rng(1)) if noise else depth
+    told = DepthNoise().simulate_depth(depth, np.random.default_rng(1)) if noise else depth
     return Seen(view_of_camera(camera, told), mask, OPENGL_TO_OPENCV @ inverse(camera.camera_to_object))

@@ -130,7 +130,7 @@ def test_a_bad_manifest_removes_no_ledger_that_another_run_made_meanwhile(
 
     monkeypatch.setattr(drive, "Ledger", LateLedger)
     with pytest.raises(UsageError, match="a bad row"):
-        drive._opened_with(bad_rows(), TwinRecipe(BuildConfig()), path)
+        drive._open_ledger_with_items(bad_rows(), TwinRecipe(BuildConfig()), path)
     with read_ledger(path) as kept:
         assert "a mug" in kept.execute("SELECT item FROM items").fetchone()[0]
 
@@ -141,7 +141,7 @@ def test_a_bad_manifest_leaves_no_new_ledger_and_no_folder(tmp_path: Path) -> No
         raise UsageError("a bad row")
 
     with pytest.raises(UsageError, match="a bad row"):
-        drive._opened_with(bad_rows(), TwinRecipe(BuildConfig()), tmp_path / "data" / "ledger.sqlite")
+        drive._open_ledger_with_items(bad_rows(), TwinRecipe(BuildConfig()), tmp_path / "data" / "ledger.sqlite")
     assert not (tmp_path / "data").exists()
 
 

@@ -21,7 +21,7 @@ from manitwin.pipeline.verify import describe, trial_settings
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.grasp_table import SCHEMA
-from manitwin.twin.store import seal
+from manitwin.twin.store import write_twin_record
 from record_overlay import overlaid
 from rehearsal_cube import CUBE
 
@@ -90,7 +90,7 @@ def _sealed(folder: Path, record: dict[str, Any], stages: tuple[str, ...]) -> st
     (folder / "run.json").write_text(json.dumps({"stages": costs, "host": {}}))
     ran = {name: {"version": "1", "backend": "builtin", "model": None} for name in sorted(stages)}
     record["provenance"]["stages"] = ran
-    return seal(folder, record).twin_id
+    return write_twin_record(folder, record).twin_id
 
 
 def _record(identity: str, folder: Path, seed: int) -> dict[str, Any]:

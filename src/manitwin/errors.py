@@ -41,7 +41,7 @@ class ManiTwinError(Exception):
     """
 
     def __init__(self, *args: object):
-        super().__init__(*(_shortened(encodable(each)) if isinstance(each, str) else each for each in args))
+        super().__init__(*(_shorten_text(encodable(each)) if isinstance(each, str) else each for each in args))
 
 
 class UsageError(ManiTwinError):
@@ -140,14 +140,14 @@ def encodable(text: str) -> str:
     return text.encode("utf-8", errors="backslashreplace").decode("utf-8")
 
 
-def _shortened(text: str) -> str:
+def _shorten_text(text: str) -> str:
     if len(text) <= _MOST_CHARACTERS:
         return text
     first = _MOST_CHARACTERS - _LAST_CHARACTERS
     return f"{text[:first]} ... ({len(text) - _MOST_CHARACTERS} more characters) ... {text[-_LAST_CHARACTERS:]}"
 
 
-def choose_from(kind: str, name: str, valid: Iterable[str]) -> str:
+def unknown_name_message(kind: str, name: str, valid: Iterable[str]) -> str:
     """Describe an unknown name, of a long one its begin: the nearest valid one first, then all of them."""
     valid, name = sorted(valid), name if len(name) <= _SHOWN_CHARACTERS else f"{name[:_SHOWN_CHARACTERS]}..."
     near = get_close_matches(name, valid, n=1)

@@ -52,5 +52,5 @@ def test_joints_and_category_are_imported(tmp_path: Path) -> None:
     folder = object_of(tmp_path / "100454", '{"model_cat": "Box"}')
     (folder / "mobility.urdf").write_text(LIDDED_BOX)
     (one,) = import_assets([folder], tmp_path / "out")
-    assert one.record is not None and one.record.called == "box" and one.record.articulation is not None
+    assert one.record is not None and one.record.prior_key == "box" and one.record.articulation is not None
     assert one.folder is not None and one.folder.name == "box"

@@ -10,7 +10,7 @@ import trimesh
 from PIL import Image
 
 from manitwin.assets.asset import Asset
-from manitwin.assets.primitives import cylinder, sphere, unwrapped
+from manitwin.assets.primitives import cylinder, sphere, unwrap_primitive
 from manitwin.assets.read import read_asset
 from manitwin.assets.readers.ogre_script import OgreMaterial, ogre_materials
 from manitwin.formats.meshes.textures import material_of, srgb_to_linear, uv_of
@@ -141,7 +141,7 @@ def test_what_a_script_names_and_is_not_there_is_said(tmp_path: Path) -> None:
 
 
 def test_a_label_goes_around_a_cylinder_as_gazebo_lays_it() -> None:
-    vertices, faces, uv = unwrapped(cylinder(0.5, 2.0), "cylinder")
+    vertices, faces, uv = unwrap_primitive(cylinder(0.5, 2.0), "cylinder")
     solid = trimesh.Trimesh(vertices, faces, process=False)
     side = np.abs(solid.face_normals[:, 2]) < 0.5
     assert solid.volume == pytest.approx(cylinder(0.5, 2.0).volume)
@@ -153,7 +153,7 @@ def test_a_label_goes_around_a_cylinder_as_gazebo_lays_it() -> None:
 
 
 def test_a_ball_has_a_map_without_a_seam_that_shows() -> None:
-    vertices, faces, uv = unwrapped(sphere(1.0), "sphere")
+    vertices, faces, uv = unwrap_primitive(sphere(1.0), "sphere")
     assert np.ptp(uv[faces][..., 0], axis=1).max() < 0.26 and 0 <= uv[:, 1].min() < 1e-9 and uv[:, 1].max() <= 1
     assert np.allclose(uv[np.argmax(vertices[:, 2]), 1], 1)
 

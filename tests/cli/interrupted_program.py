@@ -22,9 +22,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import manitwin.cli.main as cli
-from manitwin.cli.interrupt import NATIVE_PATIENCE_S, first_interrupt_calls
-from manitwin.cli.progress import WatchedRun
-from manitwin.cli.reporting import reported
+from manitwin.cli.interrupt import NATIVE_PATIENCE_S, call_on_first_interrupt
+from manitwin.cli.progress import RunDisplay
+from manitwin.cli.reporting import with_reporting_options
 
 NAME, FOLDER, MODE = sys.argv[1], Path(sys.argv[2]), sys.argv[3]
 
@@ -92,7 +92,7 @@ class Dropping:
 
 def serve() -> None:
     stop = threading.Event()
-    with first_interrupt_calls(stop.set, (signal.SIGINT,)):
+    with call_on_first_interrupt(stop.set, (signal.SIGINT,)):
         (FOLDER / "started").touch()
         stop.wait()
         time.sleep(NATIVE_PATIENCE_S + 1.0)
@@ -146,13 +146,13 @@ def rehearse() -> None:
     # a worker writes the log as it begins a stage, and no item ends
     recipe = RehearsalRecipe(log=FOLDER / "started", files={})
     items = [Item(file=None, text=f"{n} sleep:a:600") for n in range(4)]
-    with WatchedRun("items", root.url) as watched:
+    with RunDisplay("items", root.url) as watched:
         drive(recipe, items, root, RunConfig(cpu=2), configuration={}, on_start=watched.start)
 
 
 if __name__ == "__main__":
     last = InterruptsWhenTakenDown() if MODE == "late" else None
     cli.app.registered_commands = [each for each in cli.app.registered_commands if each.callback.__name__ != NAME]
-    cli.app.command(NAME)(reported(work, own_log=NAME in ("run", "trajectories")))
+    cli.app.command(NAME)(with_reporting_options(work, own_log=NAME in ("run", "trajectories")))
     sys.argv = ["manitwin", NAME]
     cli.main()

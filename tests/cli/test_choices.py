@@ -8,7 +8,7 @@ import pytest
 
 from manitwin.assets.read import FORMATS as ASSET_FORMATS
 from manitwin.assets.writers.registry import formats
-from manitwin.cli import choices
+from manitwin.cli import option_values
 from manitwin.cli.commands.doctor import KINDS
 from manitwin.cli.commands.query import WRITERS
 from manitwin.dataset.index.tables import TABLES
@@ -38,58 +38,60 @@ def literal(section: type, name: str) -> set[str]:
 @pytest.mark.parametrize(
     ("said", "known"),
     [
-        (choices.UNITS, set(get_args(StatedUnit))),
-        (choices.UP, set(get_args(Up))),
-        (choices.EXECUTORS, set(EXECUTORS)),
-        (choices.GRIPPERS, set(shipped_grippers())),
-        (choices.ROBOTS, {*shipped_robots(), *shipped_two_arms()}),
-        (choices.SKILLS, set(skill_names())),
-        (choices.SURFACES, literal(LayoutSettings, "surface")),
-        (choices.CLUTTER, literal(LayoutSettings, "clutter")),
-        (choices.CODECS, literal(PicturesConfig, "codec")),
-        (choices.RATES_HZ, {str(rate) for rate in literal(PicturesConfig, "rate_hz")}),
-        (choices.EPISODE_FORMATS, set(collect.FORMATS)),
-        (choices.EXPORT_FORMATS, {"all", *formats()}),
-        (choices.SEGMENTATION_FORMATS, set(SEGMENTATIONS)),
-        (choices.VQA_FORMATS, set(QUESTION_FORMATS)),
-        (choices.POINT_CONVENTIONS, set(CONVENTIONS)),
-        (choices.IMPORT_FORMATS, {"auto", *ASSET_FORMATS}),
-        (choices.QUERY_FORMATS, set(WRITERS)),
-        (choices.TABLES, set(TABLES)),
-        (choices.SERVED_KINDS, set(KINDS)),
-        (choices.REHEARSALS, set(REHEARSALS)),
-        (choices.ANNOTATORS, set(backends()["annotator"])),
-        (choices.GENERATORS, set(backends()["generator"])),
-        (choices.MATTING, {"none", *KNOWN_WEIGHTS}),
-        (choices.WEIGHTS, set(KNOWN_WEIGHTS)),
-        (choices.GRASPERS, set(backends()["grasper"])),
+        (option_values.UNITS, set(get_args(StatedUnit))),
+        (option_values.UP, set(get_args(Up))),
+        (option_values.EXECUTORS, set(EXECUTORS)),
+        (option_values.GRIPPERS, set(shipped_grippers())),
+        (option_values.ROBOTS, {*shipped_robots(), *shipped_two_arms()}),
+        (option_values.SKILLS, set(skill_names())),
+        (option_values.SURFACES, literal(LayoutSettings, "surface")),
+        (option_values.CLUTTER, literal(LayoutSettings, "clutter")),
+        (option_values.CODECS, literal(PicturesConfig, "codec")),
+        (option_values.RATES_HZ, {str(rate) for rate in literal(PicturesConfig, "rate_hz")}),
+        (option_values.EPISODE_FORMATS, set(collect.FORMATS)),
+        (option_values.EXPORT_FORMATS, {"all", *formats()}),
+        (option_values.SEGMENTATION_FORMATS, set(SEGMENTATIONS)),
+        (option_values.VQA_FORMATS, set(QUESTION_FORMATS)),
+        (option_values.POINT_CONVENTIONS, set(CONVENTIONS)),
+        (option_values.IMPORT_FORMATS, {"auto", *ASSET_FORMATS}),
+        (option_values.QUERY_FORMATS, set(WRITERS)),
+        (option_values.TABLES, set(TABLES)),
+        (option_values.SERVED_KINDS, set(KINDS)),
+        (option_values.REHEARSALS, set(REHEARSALS)),
+        (option_values.ANNOTATORS, set(backends()["annotator"])),
+        (option_values.GENERATORS, set(backends()["generator"])),
+        (option_values.MATTING, {"none", *KNOWN_WEIGHTS}),
+        (option_values.WEIGHTS, set(KNOWN_WEIGHTS)),
+        (option_values.GRASPERS, set(backends()["grasper"])),
     ],
-    ids=lambda value: value.kind if isinstance(value, choices.Choices) else "",
+    ids=lambda value: value.kind if isinstance(value, option_values.Choices) else "",
 )
-def test_names_are_those_of_the_module_that_they_are_for(said: choices.Choices, known: set[str]) -> None:
+def test_names_are_those_of_the_module_that_they_are_for(said: option_values.Choices, known: set[str]) -> None:
     assert set(said.find()) == known
 
 
 def test_every_camera_that_is_named_can_be_placed() -> None:
-    names = tuple(choices.CAMERAS.find())
+    names = tuple(option_values.CAMERAS.find())
     assert [camera.name for camera in named_cameras(names, load_robot("panda"))] == list(names)
 
 
 def test_wrong_name_is_refused_with_the_nearest_and_a_file_is_left_to_its_reader() -> None:
     with pytest.raises(UsageError, match=r"unknown gripper 'pandas'; did you mean 'panda'\?"):
-        choices.GRIPPERS.check(["panda", "pandas"])
-    assert choices.GRIPPERS.check(["mine.toml", "panda"]) == ["mine.toml", "panda"]
-    assert choices.ANNOTATORS.check("openai:model@http://localhost:8000/v1")
-    assert choices.GENERATORS.check("command:python make.py") and choices.GRASPERS.check(None) is None
+        option_values.GRIPPERS.check(["panda", "pandas"])
+    assert option_values.GRIPPERS.check(["mine.toml", "panda"]) == ["mine.toml", "panda"]
+    assert option_values.ANNOTATORS.check("openai:model@http://localhost:8000/v1")
+    assert option_values.GENERATORS.check("command:python make.py") and option_values.GRASPERS.check(None) is None
 
 
 def test_each_gripper_may_be_named_once() -> None:
     with pytest.raises(UsageError, match="name each only once"):
-        choices.GRIPPERS.check(["panda", "panda"])
+        option_values.GRIPPERS.check(["panda", "panda"])
 
 
 def test_list_by_commas_is_checked_and_completed_name_by_name() -> None:
-    assert choices.EXPORT_FORMATS.check("MJCF, usd") == "MJCF, usd"
+    assert option_values.EXPORT_FORMATS.check("MJCF, usd") == "MJCF, usd"
     with pytest.raises(UsageError, match="did you mean 'mjcf'"):
-        choices.EXPORT_FORMATS.check("usd,mjfc")
-    assert choices.EXPORT_FORMATS.complete("usd,u") == ["usd,urdf", "usd,usdz"], "a name that is there is not offered"
+        option_values.EXPORT_FORMATS.check("usd,mjfc")
+    assert option_values.EXPORT_FORMATS.complete("usd,u") == ["usd,urdf", "usd,usdz"], (
+        "a name that is there is not offered"
+    )

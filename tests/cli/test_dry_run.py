@@ -14,7 +14,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from json_documents import check_keys
-from manitwin.cli.build_plan import own_rate
+from manitwin.cli.build_plan import dataset_rate
 from manitwin.cli.main import app
 from manitwin.cli.measured_rates import (
     CHAIN_CPU_S,
@@ -221,7 +221,7 @@ def test_a_data_set_that_has_built_enough_tells_its_own_rate(tmp_path: Path) -> 
         for stage in ("mesh", "verify"):
             ledger.stage_ended(number, stage, "done", attempts=1, cpu_seconds=float(number))
         ledger.item_ended(number, "accepted", recipe_sha256=recipe, revision="r")
-    rate = own_rate(ledger, "mesh", "now")
+    rate = dataset_rate(ledger, "mesh", "now")
     assert rate is not None and rate.cpu_s == pytest.approx(2 * (1 + 2 + 3) / 3) and "3 accepted items" in rate.source
-    assert own_rate(ledger, "mesh", "before") is None and own_rate(ledger, "image", "now") is None
+    assert dataset_rate(ledger, "mesh", "before") is None and dataset_rate(ledger, "image", "now") is None
     ledger.close()

@@ -17,7 +17,7 @@ from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET
 from manitwin.scenes.scene import SCENE
 from manitwin.scenes.scene_files import read_scene
 from manitwin.twin.dataset_root import twin_name
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from scene_twins import slab, write_thing
 
 app = typer.Typer()
@@ -41,7 +41,7 @@ def bottles(tmp_path: Path) -> Path:
         else:
             record["placements"] = [ON_ITS_SIDE, {**standing, "probability": 0.04}]
         del record["revision"], record["files"]
-        seal(folder, record)
+        write_twin_record(folder, record)
     return root
 
 

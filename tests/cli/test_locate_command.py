@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from json_documents import check_keys
 from manitwin.cli.main import app
 from manitwin.dataset.index.rebuild import rebuild
-from manitwin.dataset.search import twin_looks
+from manitwin.dataset.search import appearance_vectors
 from manitwin.errors import UsageError
 from manitwin.formats.label_picture import label_picture
 from manitwin.geometry.poses import inverse, rotation_from_quaternion_wxyz, transform, transform_points
@@ -73,7 +73,7 @@ def test_a_box_is_found_and_what_was_decided_is_written(files: Files, tmp_path: 
     pose = told["poses"][0]
     found = transform(rotation_from_quaternion_wxyz(np.array(pose["quaternion_wxyz"])), np.array(pose["position_m"]))
     corner = files.model.points[::500]
-    same = [transform_points(found @ turn, corner) for turn in files.model.same_poses]
+    same = [transform_points(found @ turn, corner) for turn in files.model.symmetry_poses]
     true = transform_points(files.seen.object_to_camera, corner)
     assert min(np.linalg.norm(each - true, axis=1).max() for each in same) < 0.006
     assert json.loads((tmp_path / "place" / "location.json").read_text()) == told
@@ -97,7 +97,7 @@ def test_which_twin_it_is_is_told_by_looks_and_decided_by_the_score(
     files: Files, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rebuild(DatasetRoot(files.box.parents[2]), jobs=1)
-    monkeypatch.setattr(twin_looks, "AROUND", 2)
+    monkeypatch.setattr(appearance_vectors, "AROUND", 2)
     code, said = run(files.box.parents[2], *files.view, "--json")
     told = json.loads(said)
     check_keys(told, "locate DATASET")

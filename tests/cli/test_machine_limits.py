@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from manitwin.cli.machine_limits import of_machine, too_little_memory
+from manitwin.cli.machine_limits import machine_error_message, memory_limit_message
 from manitwin.cli.main import app
 from manitwin.errors import UsageError
 from manitwin.pipeline.manifest import Notes, iterate_items
@@ -43,7 +43,7 @@ def test_too_little_memory_is_told_before_anything_is_imported(command: tuple[st
 def test_help_needs_no_memory_to_speak_of() -> None:
     assert manitwin("build", "--help", limit=resource.RLIMIT_AS, value=400 * MIB).returncode == 0
     assert manitwin("--version", limit=resource.RLIMIT_AS, value=400 * MIB).returncode == 0
-    assert too_little_memory(["build", "x"]) is None, "no limit here"
+    assert memory_limit_message(["build", "x"]) is None, "no limit here"
 
 
 def test_a_limit_of_file_sizes_is_one_line(tmp_path: Path) -> None:
@@ -73,13 +73,13 @@ def test_a_limit_of_file_sizes_is_one_line(tmp_path: Path) -> None:
     ],
 )
 def test_what_the_machine_refuses_is_told_with_its_remedy(error: Exception, says: str, status: int) -> None:
-    found = of_machine(error)
+    found = machine_error_message(error)
     assert found is not None and says in found[0] and found[1] == status
 
 
 @pytest.mark.parametrize("error", [ValueError("x"), RuntimeError("x"), OSError("x"), ConnectionResetError(104, "x")])
 def test_defects_stay_defects(error: Exception) -> None:
-    assert of_machine(error) is None
+    assert machine_error_message(error) is None
 
 
 @pytest.mark.parametrize("key", [key for key in LONGEST if key not in ("file", "text")])

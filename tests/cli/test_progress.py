@@ -8,7 +8,7 @@ import threading
 
 from rich.console import Console
 
-from manitwin.cli.progress import RunProgress, ShownProgress, ShownWaits, duration
+from manitwin.cli.progress import RunProgress, ShownProgress, WaitNotices, duration
 from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageStarted
 from manitwin.engine.stage import StagePart
 from manitwin.engine.task import Task
@@ -56,10 +56,10 @@ def test_time_left_is_that_of_the_rate_and_said_only_after_three_items() -> None
     progress = RunProgress("items", clock)
     progress.start(10)
     for number in range(3):
-        assert progress.left_s() is None and "left" not in progress.line()
+        assert progress.remaining_s() is None and "left" not in progress.line()
         clock.now_s += 100.0
         progress.item_ended(ended(number))
-    assert progress.left_s() == 7 * 100.0
+    assert progress.remaining_s() == 7 * 100.0
     assert progress.line() == "3 of 10 items; about 12 min left; 3 accepted"
 
 
@@ -70,10 +70,10 @@ def test_long_stages_count_by_what_they_have_done() -> None:
     progress.stage(StageStarted(task(0), "films"))
     clock.now_s = 60.0
     progress.stage(StageAdvanced(task(0), "films", StagePart(40, 800, "frames")))
-    assert progress.left_s() is None, "a twentieth of one item is too little to go by"
+    assert progress.remaining_s() is None, "a twentieth of one item is too little to go by"
     clock.now_s = 120.0
     progress.stage(StageAdvanced(task(0), "films", StagePart(400, 800, "frames")))
-    assert progress.left_s() == 120.0 / 0.5 * 3.5
+    assert progress.remaining_s() == 120.0 / 0.5 * 3.5
     assert progress.line() == "0 of 4 batches; about 14 min left; under way: 1 films (400 of 800 frames)"
     progress.item_ended(ended(0))
     assert "frames" not in progress.line()
@@ -86,7 +86,7 @@ def test_what_is_heard_of_an_item_after_its_end_is_ignored() -> None:
     progress.item_ended(ended(0, "failed"))
     progress.stage(StageStarted(task(0), "views"))
     progress.stage(StageAdvanced(task(0), "views", StagePart(1, 2, "pictures")))
-    assert progress.line() == "1 of 2 items; 1 failed" and progress.parts_done == 0
+    assert progress.line() == "1 of 2 items; 1 failed" and progress.fractional_done == 0
     progress.stage(StageStarted(task(1), "views"))
     assert progress.line() == "1 of 2 items; 1 failed; under way: 1 views"
 
@@ -97,11 +97,11 @@ def test_items_that_were_there_already_do_not_make_the_others_quicker() -> None:
     progress.start(1000)
     for number in range(900):
         progress.item_ended(ended(number, found=True))
-    assert progress.left_s() is None
+    assert progress.remaining_s() is None
     for number in range(900, 904):
         clock.now_s += 50.0
         progress.item_ended(ended(number))
-    assert progress.left_s() == 96 * 50.0
+    assert progress.remaining_s() == 96 * 50.0
 
 
 def test_durations_are_no_more_exact_than_they_are_worth() -> None:
@@ -173,7 +173,7 @@ def test_nothing_is_shown_on_a_quiet_console() -> None:
 
 def test_what_waits_for_a_service_that_is_down_is_told_again_with_the_time_that_is_left() -> None:
     clock, out = Clock(), io.StringIO()
-    waits = ShownWaits(Console(file=out, width=1000), clock)
+    waits = WaitNotices(Console(file=out, width=1000), clock)
     down = "vlm at http://host does not answer; run again later"
     for at_s in range(0, 1801, 60):
         clock.now_s = float(at_s)
@@ -188,7 +188,7 @@ def test_what_waits_for_a_service_that_is_down_is_told_again_with_the_time_that_
 
 def test_what_is_only_tried_again_or_given_up_is_told_once() -> None:
     clock, out = Clock(), io.StringIO()
-    waits = ShownWaits(Console(file=out, width=1000), clock)
+    waits = WaitNotices(Console(file=out, width=1000), clock)
     for _ in range(5):
         waits.stage(StageEnded(task(1), "generate", "waiting", detail="asks to wait"))
         waits.stage(StageEnded(task(1), "gate", "waiting", detail="down; run again later", given_up_in_s=0.0))

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from manitwin.api import build
-from manitwin.cli.annotator_questions import AskedQuestions, questions_about, write_questions
+from manitwin.cli.annotator_questions import AskedQuestions, list_annotator_questions, write_questions
 from manitwin.config import BuildConfig, ServicesConfig
 from manitwin.errors import TwinError, UsageError
 from manitwin.formats.isolated import Limits
@@ -39,7 +39,7 @@ def asked_and_built(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[dict
     folder = report.results[0].folder
     assert folder is not None and report.results[0].status == "accepted"
     bodies = [request.json() for request in server.requests]
-    return bodies, questions_about(folder, config, config.annotator), folder
+    return bodies, list_annotator_questions(folder, config, config.annotator), folder
 
 
 def asked_at_first(bodies: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -113,7 +113,7 @@ def test_folders_hold_text_with_picture_names_and_a_bill(
     readme = (tmp_path / "asked" / "README.md").read_text()
     assert "8_grasp_points_3" in readme and "usd_per_million_tokens" in readme
     priced = BuildConfig(services=ServicesConfig(usd_per_million_tokens=(1.0, 10.0)))
-    write_questions(questions_about(folder, priced, "openai:MODEL"), tmp_path / "priced")
+    write_questions(list_annotator_questions(folder, priced, "openai:MODEL"), tmp_path / "priced")
     assert "usd_per_million" not in (tmp_path / "priced" / "README.md").read_text()
     with pytest.raises(UsageError, match="not empty"):
         write_questions(questions, tmp_path / "asked")
@@ -121,7 +121,7 @@ def test_folders_hold_text_with_picture_names_and_a_bill(
 
 def test_folder_that_is_no_twin_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TwinError):
-        questions_about(tmp_path, BuildConfig(), "openai:MODEL")
+        list_annotator_questions(tmp_path, BuildConfig(), "openai:MODEL")
 
 
 def test_twin_is_read_in_a_process_with_limits_of_its_own(
@@ -134,7 +134,7 @@ def test_twin_is_read_in_a_process_with_limits_of_its_own(
 
     monkeypatch.setattr("manitwin.cli.annotator_questions.Twin", refused)
     monkeypatch.setattr("manitwin.cli.annotator_questions.read_questions", refused)
-    assert len(questions_about(asked_and_built[2], BuildConfig(), "openai:MODEL").questions) == 11
+    assert len(list_annotator_questions(asked_and_built[2], BuildConfig(), "openai:MODEL").questions) == 11
     monkeypatch.setattr("manitwin.cli.annotator_questions.LIMITS", Limits(seconds=0.05))
     with pytest.raises(TwinError, match=r"within 0\.05 s"):
-        questions_about(asked_and_built[2], BuildConfig(), "openai:MODEL")
+        list_annotator_questions(asked_and_built[2], BuildConfig(), "openai:MODEL")

@@ -11,13 +11,13 @@ import typer
 from typer.testing import CliRunner
 
 from imported_modules import imported_of
+from manitwin.cli.lazy_help import only_asked_for
 from manitwin.cli.main import app
-from manitwin.cli.quick_start import only_asked_for
 
 NAMES = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 PUT_OFF = """
 import sys
-from manitwin.cli.quick_start import import_quick_help
+from manitwin.cli.lazy_help import import_quick_help
 import_quick_help()
 import typer.rich_utils as drawn
 assert not {"rich.markdown", "rich.traceback", "pygments"} & set(sys.modules)

@@ -18,7 +18,7 @@ import typer
 from typer.testing import CliRunner
 
 from manitwin.cli.main import app
-from manitwin.cli.run_log import RunLog, WithoutSecrets, begin_log, end_log
+from manitwin.cli.run_log import RedactingFormatter, RunLog, begin_log, end_log
 from manitwin.engine.ledger.location import local_log
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -31,9 +31,9 @@ PROGRAM = """
 import sys
 from pathlib import Path
 import manitwin.cli.main as cli
-from manitwin.cli.reporting import reported
+from manitwin.cli.reporting import with_reporting_options
 from manitwin.cli.console import err_console, out_console, print_error
-from manitwin.cli.progress import WatchedRun
+from manitwin.cli.progress import RunDisplay
 
 def work() -> None:
     from manitwin.config import RunConfig
@@ -44,7 +44,7 @@ def work() -> None:
 
     root = DatasetRoot("data")
     items = [Item(file=None, text=text) for text in ("good", "reject:b", "raise:a")]
-    with WatchedRun("layouts", "data") as watched:
+    with RunDisplay("layouts", "data") as watched:
         drive(
             RehearsalRecipe(), items, root, RunConfig(cpu=1, attempts=1), configuration={}, executor="inline",
             **watched.callbacks,
@@ -55,7 +55,7 @@ def work() -> None:
 
 KEY = "sk-1234567890-not-a-real-key"
 cli.app.registered_commands = [each for each in cli.app.registered_commands if each.callback.__name__ != "layout"]
-cli.app.command("layout")(reported(work, own_log=True))
+cli.app.command("layout")(with_reporting_options(work, own_log=True))
 cli.main()
 """
 
@@ -185,8 +185,8 @@ def test_a_key_in_a_traceback_is_hidden_as_well(monkeypatch: pytest.MonkeyPatch)
         raise ValueError("refused: Bearer hush-hush-hush")
     except ValueError:
         record = logging.LogRecord("manitwin", logging.ERROR, "", 0, "it failed", None, sys.exc_info())
-    assert "Bearer ***" in WithoutSecrets().format(record)
-    assert "hush" not in WithoutSecrets().format(record)
+    assert "Bearer ***" in RedactingFormatter().format(record)
+    assert "hush" not in RedactingFormatter().format(record)
 
 
 def test_log_of_a_url_lies_beside_its_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

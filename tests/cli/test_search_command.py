@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from json_documents import check_keys
 from manitwin.cli.main import app
 from manitwin.dataset.index.rebuild import rebuild
-from manitwin.dataset.search import twin_looks
+from manitwin.dataset.search import appearance_vectors
 from manitwin.twin.dataset_root import DatasetRoot
 from scene_twins import can, slab, write_thing
 
@@ -32,7 +32,7 @@ def run(*arguments: object) -> str:
 
 
 def test_words_and_a_picture_find_twins(dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(twin_looks, "AROUND", 2)
+    monkeypatch.setattr(appearance_vectors, "AROUND", 2)
     assert "knife" in run("search", dataset, "red knives", "--limit", 1)
     assert "no twin matches these words" in run("search", dataset, "xylophone")
     misspelt = CliRunner().invoke(app, ["search", str(dataset), "red nife"])

@@ -15,7 +15,7 @@ from manitwin.cli.summary import print_summary
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from twin_folders import write_accepted
 
 
@@ -31,7 +31,7 @@ def shown(root: Path, placements: list[dict[str, Any]]) -> list[str]:
     folder = root / twin_name(write_accepted(root, 1))
     record = json.loads((folder / RECORD).read_bytes())
     del record["revision"], record["files"]
-    seal(folder, record | {"placements": placements})
+    write_twin_record(folder, record | {"placements": placements})
     page = io.StringIO()
     print_summary(Twin(folder), Console(width=200, file=page))
     return [" ".join(line.split()) for line in page.getvalue().splitlines()]
@@ -62,7 +62,7 @@ def test_a_centre_of_mass_has_no_negative_zero(tmp_path: Path) -> None:
     record = json.loads((folder / RECORD).read_bytes())
     del record["revision"], record["files"]
     record["physical"]["center_of_mass_m"] = [0.0, -1e-5, 0.086]
-    seal(folder, record)
+    write_twin_record(folder, record)
     page = io.StringIO()
     print_summary(Twin(folder), Console(width=200, file=page))
     assert "(0, 0, 86) mm" in page.getvalue()

@@ -17,9 +17,9 @@ from rich.table import Table
 from rich.text import Text
 
 import manitwin.cli.main as main_module
-from manitwin.cli.console import LoggedConsole, shown_text, write_json, write_text
-from manitwin.cli.run_log import WithoutSecrets
-from manitwin.cli.terminal import guard_terminal
+from manitwin.cli.console import LoggedConsole, escape_cell_text, write_json, write_text
+from manitwin.cli.run_log import RedactingFormatter
+from manitwin.cli.terminal import escape_terminal_output
 from manitwin.errors import InputError, TwinError, encodable
 from manitwin.formats.printable import printable_json
 
@@ -53,7 +53,7 @@ def test_console_escapes_texts_tables_and_cells_and_reads_no_markup(text: str) -
     if text.startswith("["):
         assert stream.getvalue() == f"a {text} b\n", "markup is shown as it was written"
     table = Table(box=None)
-    table.add_row(Text(text), shown_text(text))
+    table.add_row(Text(text), escape_cell_text(text))
     shown.print(table)
     said = stream.getvalue()
     assert not OBEYED.search(said)
@@ -106,7 +106,7 @@ def test_errors_are_one_escaped_line_that_utf8_has(
 @pytest.mark.parametrize("text", HOSTILE, ids=ascii)
 def test_log_of_a_run_and_logs_of_libraries_are_escaped(text: str, capsys: pytest.CaptureFixture[str]) -> None:
     record = logging.LogRecord("manitwin", logging.INFO, "x.py", 1, "%s\nforged line", (text,), None)
-    said = WithoutSecrets().format(record)
+    said = RedactingFormatter().format(record)
     assert not OBEYED.search(said)
     assert said.split("\n")[1] == "    forged line"
 
@@ -116,7 +116,7 @@ def test_warnings_and_tracebacks_of_python_are_escaped(
 ) -> None:
     monkeypatch.setattr(warnings, "formatwarning", warnings.formatwarning)
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)
-    guard_terminal()
+    escape_terminal_output()
     assert not OBEYED.search(warnings.formatwarning("\x1b[2J", UserWarning, "a\x9b.py", 3, None))
     try:
         raise ValueError("\x1b[2J\u202e")

@@ -7,12 +7,12 @@ import sys
 
 PROGRAM = """
 import random, signal
-from manitwin.cli.interrupt import until_interrupted
+from manitwin.cli.interrupt import wait_for_interrupt
 
 draw = random.Random(1)
 signal.signal(signal.SIGALRM, signal.SIG_IGN)
 for number in range(20000):
-    with until_interrupted((signal.SIGALRM,)) as wait:
+    with wait_for_interrupt((signal.SIGALRM,)) as wait:
         signal.setitimer(signal.ITIMER_REAL, draw.uniform(5e-6, 8e-5))
         wait()
 print(number + 1)

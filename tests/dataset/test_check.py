@@ -18,15 +18,15 @@ from manitwin.config import RunConfig
 from manitwin.dataset.check import damaged_twins, disagreements
 from manitwin.dataset.index.parts import IndexTables, indexed_twins
 from manitwin.engine.drive import RunReport, drive
+from manitwin.engine.ledger.integrity import LedgerDamaged
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.ledger.reading import read_ledger
-from manitwin.engine.ledger.soundness import LedgerDamaged
 from manitwin.errors import UsageError
 from manitwin.pipeline.item import Item
 from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.integrity import write_sizes
 from manitwin.twin.migration import SCHEMA_VERSION
 from manitwin.twin.store import RECORD, canonical_json, read_record, revision_of
-from manitwin.twin.wholeness import note_sizes
 from rehearsal_recipe import RehearsalRecipe
 from twin_folders import write_accepted
 
@@ -164,11 +164,11 @@ def test_twin_without_sizes_is_looked_at_by_its_files_own_ends(tmp_path: Path, f
 
 
 def test_amended_twin_is_whole(tmp_path: Path) -> None:
-    from manitwin.twin.store import amend
+    from manitwin.twin.store import replace_files
 
     folder = tmp_path / DatasetRoot(tmp_path).twin_name(write_accepted(tmp_path, 1))
-    note_sizes(folder)
-    amend(folder, {"source.obj": b"other"}, lambda sizes: note_sizes(folder, sizes))
+    write_sizes(folder)
+    replace_files(folder, {"source.obj": b"other"}, lambda sizes: write_sizes(folder, sizes))
     assert list(damaged_twins(DatasetRoot(tmp_path), digests=True)) == [] and read_record(folder, verify=True)
 
 
@@ -288,7 +288,7 @@ def made_newer(folder: Path) -> bytes:
     said = json.loads((folder / RECORD).read_text()) | {"schema_version": SCHEMA_VERSION + 1, "weather": "fine"}
     said["revision"] = revision_of(said)
     (folder / RECORD).write_text(canonical_json(said))
-    note_sizes(folder)
+    write_sizes(folder)
     return (folder / RECORD).read_bytes()
 
 

@@ -18,7 +18,7 @@ from PIL import Image
 
 from input_items import collect_items
 from manitwin.config import BuildConfig, load_config
-from manitwin.models.annotators.priors import _prior, _read, load_priors
+from manitwin.models.annotators.priors import _build_prior, _read, load_priors
 from manitwin.models.registry import GROUP
 from manitwin.robots.load import load_robot
 
@@ -45,7 +45,7 @@ def _settings(text: str, folder: Path, name: str) -> None:
 def _prior_of_a_category(text: str, folder: Path, domain: str) -> None:
     for category, row in tomllib.loads(text).items():
         assert category not in load_priors(), "it is there already"
-        _prior(category, row, domain, _read(domain).get("defaults", {}), _read("forms"))
+        _build_prior(category, row, domain, _read(domain).get("defaults", {}), _read("forms"))
 
 
 def _robot(text: str, folder: Path, name: str) -> None:

@@ -21,7 +21,7 @@ from manitwin.formats.label_picture import label_picture
 from manitwin.geometry.poses import inverse, transform
 from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from posed_things import PLACES, pose_at, write_posed
 from scene_twins import bowl, can, slab, write_thing
 from seen_solids import seen_from
@@ -204,7 +204,7 @@ def _complete(twin: Path) -> None:
     del record["revision"], record["files"]
     record["grasps"]["verified"] = 24
     record["grasps"]["trial"] = tried_as_built()
-    seal(twin, record)
+    write_twin_record(twin, record)
 
 
 def _copied(source: Path, target: Path) -> None:

@@ -10,7 +10,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from manitwin.engine.fork_server import parent_of_workers
-from manitwin.engine.process_bounds import die_with
+from manitwin.engine.process_limits import set_parent_death_signal
 from manitwin.engine.worker_processes import WorkerContext, hidden_main_module
 
 MODULE = "this"  # of Python's own, which nothing imports; it prints a poem
@@ -18,7 +18,7 @@ MODULE = "this"  # of Python's own, which nothing imports; it prints a poem
 
 def tell(answer: Connection, driver: int) -> None:
     """Say what this process has of the one that it works for, and wait for an answer."""
-    die_with(parent_of_workers(driver))
+    set_parent_death_signal(parent_of_workers(driver))
     answer.send(
         {
             "pid": os.getpid(),

@@ -43,7 +43,7 @@ class Words(FolderRecipe[WordRecord]):
     def write(self, draft: Draft[Word], *given: Any) -> WordRecord:
         fresh = given[-1]
         (fresh / "word.txt").write_text(draft.payload.word)
-        return self.seal(fresh, {"letters": len(draft.payload.word)}, decided_by=draft.payload.word)
+        return self.write_record(fresh, {"letters": len(draft.payload.word)}, decided_by=draft.payload.word)
 
     def ending(self, record: WordRecord) -> Ending:
         return Ending("accepted", record.revision, None, f"{record.letters} letters")

@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 
-from manitwin.engine.process_bounds import ONE_THREAD
+from manitwin.engine.process_limits import ONE_THREAD
 
 HEAD = """
 import json, logging, os, signal, sys, threading, time
 from forked_worker import MODULE, started
-from manitwin.engine.fork_server import forked_workers, why_not_forked
+from manitwin.engine.fork_server import forked_workers, fork_obstacle
 
 def say(said):
     print(json.dumps(said), flush=True)
@@ -45,7 +45,7 @@ with forked_workers([MODULE]):
     said, process, end = started()
     end.send("end")
     process.join()
-say({"driver": os.getpid(), "worker": said, "why": why_not_forked(), "known": why_not_forked(["sleeper"])})
+say({"driver": os.getpid(), "worker": said, "why": fork_obstacle(), "known": fork_obstacle(["sleeper"])})
 """
 SERVER_KILLED = """
 with forked_workers([]):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from manitwin.engine.machine_share import WORKER_BYTES, available_cores, available_memory_bytes, available_workers
+from manitwin.engine.machine_resources import WORKER_BYTES, available_cores, available_memory_bytes, available_workers
 
 
 @pytest.fixture(autouse=True)

@@ -73,7 +73,7 @@ def test_a_refused_key_stops_the_run_and_costs_no_attempt(tmp_path: Path) -> Non
 def test_the_limit_counts_what_is_under_way() -> None:
     budget = Budget(1.0)
     budget.begin(1, 0.6)
-    assert not budget.allows(0.5) and budget.allows(0.4) and budget.allows(0.0) and not budget.nothing_under_way
+    assert not budget.allows(0.5) and budget.allows(0.4) and budget.allows(0.0) and not budget.has_no_running_jobs
     budget.end(1, 0.1)
-    assert budget.allows(0.9) and not budget.allows(0.95) and budget.nothing_under_way
+    assert budget.allows(0.9) and not budget.allows(0.95) and budget.has_no_running_jobs
     assert Budget(None).allows(1e9)

@@ -42,13 +42,13 @@ def test_pauses_double_to_a_minute_and_an_answer_ends_them(clock: Clock) -> None
     gate = Gate(None, 10_000, clock)
     waits = []
     for _ in range(8):
-        gate.down()
-        gate.down()  # others that began before the pause
+        gate.record_outage()
+        gate.record_outage()  # others that began before the pause
         waits.append(gate.opens_in_s())
         clock.now += waits[-1]
     assert waits == [1, 2, 4, 8, 16, 32, 60, 60]
-    gate.answered()
-    gate.down()
+    gate.record_answer()
+    gate.record_outage()
     assert gate.opens_in_s() == 1
 
 
@@ -57,18 +57,18 @@ def test_what_the_service_asks_for_is_waited(clock: Clock) -> None:
     gate.wait(7.5)
     gate.wait(2.0)
     assert gate.opens_in_s() == 7.5
-    assert not gate.given_up, "who asks to wait is not down"
+    assert not gate.is_patience_exhausted, "who asks to wait is not down"
 
 
 def test_given_up_after_the_patience_since_the_first_failure(clock: Clock) -> None:
     gate = Gate(None, 5, clock)
-    assert gate.given_up_in_s is None
+    assert gate.remaining_patience_s is None
     for seconds, left_s in ((0, 5), (1, 4), (2, 2)):
         clock.now += seconds
-        gate.down()
-        assert not gate.given_up and gate.given_up_in_s == left_s
+        gate.record_outage()
+        assert not gate.is_patience_exhausted and gate.remaining_patience_s == left_s
     clock.now += 4
-    gate.down()
-    assert gate.given_up and gate.given_up_in_s == 0
-    gate.answered()
-    assert not gate.given_up and gate.given_up_in_s is None
+    gate.record_outage()
+    assert gate.is_patience_exhausted and gate.remaining_patience_s == 0
+    gate.record_answer()
+    assert not gate.is_patience_exhausted and gate.remaining_patience_s is None

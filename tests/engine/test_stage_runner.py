@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 import pytest
 from pydantic import BaseModel
 
-from manitwin.engine.charges import charge, counted, note_rehearsal
+from manitwin.engine.charges import charge, note_rehearsal, record_charges
 from manitwin.engine.lost_charges import lost_usd
 from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import run_stage, stage_key
@@ -100,11 +100,11 @@ def test_what_failed_attempts_were_charged_is_part_of_the_one_that_succeeds(tmp_
             return super().run(draft, folder)
 
     for _ in range(2):
-        with counted() as bill, pytest.raises(type(error)):
+        with record_charges() as bill, pytest.raises(type(error)):
             run_stage(Paid(fail=error), draft(), tmp_path)
         assert bill.usd == pytest.approx(0.02)
     assert lost_usd(tmp_path / "counting") == pytest.approx(0.04)
-    with counted() as bill:
+    with record_charges() as bill:
         ran = run_stage(Paid(), draft(), tmp_path)
     assert (bill.usd, ran.cost.cost_usd) == (pytest.approx(0.02), pytest.approx(0.06))
     assert lost_usd(tmp_path / "counting") == 0.0

@@ -30,41 +30,41 @@ def ledger(tmp_path: Path) -> Iterator[Ledger]:
 def test_job_is_due_when_enough_items_have_ended_and_none_is_under_way(ledger: Ledger) -> None:
     tables = TableWriter(ledger, every=2, attempts=3)
     tables.item_ended()
-    assert tables.due() is None
+    assert tables.next_job() is None
     tables.item_ended()
-    assert tables.due() == WriteTables(("twin1", "twin2", "twin3"))
+    assert tables.next_job() == WriteTables(("twin1", "twin2", "twin3"))
     for _ in range(2):
         tables.item_ended()
-    assert tables.due() is None, "the first one is still being written"
-    assert tables.written(None) is None and ledger.not_indexed(10) == []
-    assert tables.due() is None, "there is nothing left to write"
+    assert tables.next_job() is None, "the first one is still being written"
+    assert tables.handle_reply(None) is None and ledger.unindexed_ids(10) == []
+    assert tables.next_job() is None, "there is nothing left to write"
 
 
 def test_end_of_a_run_writes_the_rest_and_merges_once(ledger: Ledger) -> None:
     tables = TableWriter(ledger, every=500, attempts=3)
-    assert tables.due_at_the_end() == WriteTables(("twin1", "twin2", "twin3"))
-    tables.written(None)
-    assert tables.due_at_the_end() == WriteTables(())
-    tables.written(BROKEN)
-    assert tables.due_at_the_end() == WriteTables(()), "a merge that failed is tried again"
-    tables.written(None)
-    assert tables.due_at_the_end() is None
+    assert tables.final_job() == WriteTables(("twin1", "twin2", "twin3"))
+    tables.handle_reply(None)
+    assert tables.final_job() == WriteTables(())
+    tables.handle_reply(BROKEN)
+    assert tables.final_job() == WriteTables(()), "a merge that failed is tried again"
+    tables.handle_reply(None)
+    assert tables.final_job() is None
 
 
 def test_run_without_tables_has_none_due(ledger: Ledger) -> None:
     tables = TableWriter(ledger, every=0, attempts=3)
     tables.item_ended()
-    assert tables.due() is None and tables.due_at_the_end() is None
+    assert tables.next_job() is None and tables.final_job() is None
 
 
 def test_failures_in_a_row_stop_the_run_and_a_full_disk_does_at_once(ledger: Ledger) -> None:
     tables = TableWriter(ledger, every=1, attempts=2)
     for reply, stop in ((BROKEN, False), (None, False), (BROKEN, False), (BROKEN, True)):
         ledger.connection.execute("UPDATE items SET indexed = 0")
-        assert tables.due_at_the_end() is not None
-        assert (tables.written(reply) is not None) == stop
+        assert tables.final_job() is not None
+        assert (tables.handle_reply(reply) is not None) == stop
     tables = TableWriter(ledger, every=1, attempts=2)
-    assert tables.due_at_the_end() is not None
-    full = tables.written(Failure("no_space", "the disk is full"))
+    assert tables.final_job() is not None
+    full = tables.handle_reply(Failure("no_space", "the disk is full"))
     assert full == "the disk is full; free disk space, then rerun the command to resume"
-    assert len(ledger.not_indexed(10)) == 3, "what failed is not noted as written"
+    assert len(ledger.unindexed_ids(10)) == 3, "what failed is not noted as written"

@@ -10,7 +10,7 @@ from multiprocessing.connection import Connection
 import numpy as np
 import pytest
 
-from manitwin.engine.process_bounds import ONE_THREAD
+from manitwin.engine.process_limits import ONE_THREAD
 from manitwin.engine.worker_processes import WorkerContext
 
 FREED = """

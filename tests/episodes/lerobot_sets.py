@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from synthetic_episodes import episode
 
-from manitwin.episodes.film_encoders import Codec
+from manitwin.episodes.downsampling import downsample
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
 from manitwin.episodes.lerobot.write import LeRobotSummary, write_lerobot
-from manitwin.episodes.lower_rates import at_rate
 from manitwin.episodes.stored_episode import StoredEpisode
-from manitwin.episodes.video import EpisodesVideo
+from manitwin.episodes.video import VideoWriter
+from manitwin.episodes.video_encoders import Codec
 
 HEIGHT_PX, WIDTH_PX = 48, 64
 
@@ -47,9 +47,9 @@ def camera(
     clips: dict[str, Clip] = {}
     for number in range(0, len(given), 2):
         path = folder / f"{name}_{number}.mp4"
-        with EpisodesVideo(path, width_px=WIDTH_PX, height_px=HEIGHT_PX, codec=codec, rate_hz=rate_hz) as video:
+        with VideoWriter(path, width_px=WIDTH_PX, height_px=HEIGHT_PX, codec=codec, rate_hz=rate_hz) as video:
             for offset, one in enumerate(given[number : number + 2]):
-                steps = at_rate(one.recording, rate_hz).steps
+                steps = downsample(one.recording, rate_hz).steps
                 span = video.add(picture(number + offset, t, steps) for t in range(steps + 1))
                 clips[one.attempt.episode_id] = Clip(path, span.first_frame)
     return CameraVideos(name, clips)

@@ -11,16 +11,16 @@ from synthetic_episodes import attempt, episode
 
 from manitwin.episodes.attempts import ATTEMPTS, merge_attempts, write_attempts
 from manitwin.episodes.batch import BATCH_RECORD, BatchRecord
+from manitwin.episodes.downsampling import downsample
 from manitwin.episodes.episode_pictures import PICTURES_RECORD, PicturesRecord, batch_name
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import write_episodes
-from manitwin.episodes.lower_rates import at_rate
 from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode
-from manitwin.episodes.video import EpisodesVideo
+from manitwin.episodes.video import VideoWriter
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import TwinSource
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from twin_folders import twin_id, write_accepted
 
 LICENCES = {0: "CC-BY-4.0", 1: "CC0-1.0", 2: "CC-BY-NC-4.0", 3: "unknown"}
@@ -47,7 +47,7 @@ def write_twins(root: Path) -> None:
         record = json.loads((folder / RECORD).read_bytes())
         record["source"] |= {"license": licence, "attribution": "Ada & Bo" if number == 0 else None}
         del record["revision"], record["files"]
-        seal(folder, record)
+        write_twin_record(folder, record)
 
 
 def write_run(root: Path, twins: Path, *, drawn: bool, rate_hz: int = 20) -> None:
@@ -92,9 +92,9 @@ PINHOLE = {"camera.intrinsics_px": [[80.0, 0.0, 32.0], [0.0, 80.0, 24.0], [0.0, 
 
 def draw(folder: Path, both: list[StoredEpisode], rate_hz: int) -> None:
     first_frames = {}
-    with EpisodesVideo(folder / "front.mp4", width_px=WIDTH_PX, height_px=HEIGHT_PX, rate_hz=rate_hz) as film:
+    with VideoWriter(folder / "front.mp4", width_px=WIDTH_PX, height_px=HEIGHT_PX, rate_hz=rate_hz) as film:
         for each in both:
-            number, steps = each.facts["number"], at_rate(each.recording, rate_hz).steps
+            number, steps = each.facts["number"], downsample(each.recording, rate_hz).steps
             span = film.add(picture(number, t, steps) for t in range(steps))
             first_frames[each.attempt.episode_id] = span.first_frame
     record = PicturesRecord(

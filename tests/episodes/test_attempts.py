@@ -12,7 +12,7 @@ from publishable_run import write_record
 from synthetic_episodes import attempt
 
 from manitwin.episodes import attempts as table
-from manitwin.episodes.attempts import ATTEMPTS, OUTCOMES, Attempt, success_of
+from manitwin.episodes.attempts import ATTEMPTS, OUTCOMES, Attempt, count_attempts
 from manitwin.episodes.batch import BATCHES
 from manitwin.episodes.collect import collect
 from manitwin.errors import EpisodesError
@@ -55,7 +55,7 @@ def test_merging_nothing_gives_an_empty_table(tmp_path: Path) -> None:
 
 
 def test_what_grasps_failed_of_and_who_has_none_is_counted_of_attempts_that_were_never_executed() -> None:
-    counted = success_of(
+    counted = count_attempts(
         [
             attempt(1, plan_failures='{"approach_blocked": 9}'),
             attempt(2, outcome="no_plan", plan_failures='{"no_path": 1}'),

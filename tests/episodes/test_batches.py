@@ -6,12 +6,12 @@ import itertools
 
 import pytest
 
-from manitwin.episodes.batch import Batch, batches
+from manitwin.episodes.batch import Batch, missing_batches
 from manitwin.errors import UsageError
 
 
 def _twins(dealt: list[Batch]) -> dict[int, str]:
-    numbers = [(number, batch.of) for batch in dealt for number in batch.numbers]
+    numbers = [(number, batch.source_id) for batch in dealt for number in batch.numbers]
     assert len(dict(numbers)) == len(numbers)
     return dict(numbers)
 
@@ -20,16 +20,16 @@ def _twins(dealt: list[Batch]) -> dict[int, str]:
 def test_steps_make_what_one_go_makes(size: int) -> None:
     ids, there = ["a", "b", "c", "d"], list[Batch]()
     for count in (4, 6, 8, 29, 30, 20):
-        there += batches("panda", count, size, twin_ids=ids, there=there)
-    assert _twins(there) == _twins(batches("panda", 30, size, twin_ids=ids))
+        there += missing_batches("panda", count, size, twin_ids=ids, there=there)
+    assert _twins(there) == _twins(missing_batches("panda", 30, size, twin_ids=ids))
     assert _twins(there) == dict(zip(range(30), itertools.cycle(ids), strict=False))
     assert max(batch.count for batch in there) <= size
 
 
 def test_a_twin_that_came_later_catches_up_and_batches_go_round() -> None:
-    there = batches("panda", 8, 2, twin_ids=["a", "b"])
-    assert [batch.of for batch in there] == ["a", "b", "a", "b"]
-    more = batches("panda", 15, 2, twin_ids=["a", "new", "b"], there=there)
+    there = missing_batches("panda", 8, 2, twin_ids=["a", "b"])
+    assert [batch.source_id for batch in there] == ["a", "b", "a", "b"]
+    more = missing_batches("panda", 15, 2, twin_ids=["a", "new", "b"], there=there)
     assert sorted(_twins([*there, *more])) == list(range(15))
     assert [number for number, each in _twins(more).items() if each == "new"] == [8, 9, 10, 11, 13]
 
@@ -43,4 +43,4 @@ def test_a_batch_of_an_older_version_keeps_its_id() -> None:
 def test_batches_of_older_versions_that_repeat_each_other_are_refused() -> None:
     there = [Batch("panda", 0, 1, twin_id="a"), Batch("panda", 0, 2, twin_id="a")]
     with pytest.raises(UsageError, match=r"repeats episodes of another one; .*new folder"):
-        batches("panda", 8, 2, twin_ids=["a"], there=there)
+        missing_batches("panda", 8, 2, twin_ids=["a"], there=there)

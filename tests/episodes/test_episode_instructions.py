@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from manitwin.episodes.instructions import episode_instructions
-from manitwin.episodes.naming import names_of, tells_apart
+from manitwin.episodes.naming import is_distinguishable, names_of
 from manitwin.errors import UsageError
+from manitwin.models.annotators.descriptions import write_captions
 from manitwin.models.annotators.priors import load_priors
-from manitwin.models.annotators.words import write_captions
 from manitwin.twin.record import Language
 
 START = np.array([0.5, 0.0, 0.0])
@@ -159,7 +159,7 @@ def test_a_name_that_another_kind_goes_by_too_is_not_said(category: str, other: 
     told = names(thing, blue)
     assert told and all("red" in name for name in told)
     assert names(blue, thing)[0] == other  # the longer name means one alone
-    assert not tells_apart(thing, [words(category=other, color="red", caption=f"A red {other}.")])
+    assert not is_distinguishable(thing, [words(category=other, color="red", caption=f"A red {other}.")])
 
 
 def test_what_only_ends_alike_is_another_thing() -> None:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image, features
 
-from manitwin.episodes.film import Film, VideoFacts, video_facts
-from manitwin.episodes.film_encoders import CODECS
 from manitwin.episodes.settings import PicturesConfig
-from manitwin.episodes.video import EpisodesVideo, require_encoder, write_animation
+from manitwin.episodes.video import VideoWriter, require_encoder, write_animation
+from manitwin.episodes.video_encoders import CODECS
+from manitwin.episodes.video_reading import VideoFacts, VideoReader, video_facts
 from manitwin.errors import EpisodesError, UsageError
 
 WIDTH, HEIGHT = 96, 64
@@ -37,12 +37,12 @@ def number_of(picture: np.ndarray) -> int:
 
 
 def decoded(path: Path) -> list[np.ndarray]:
-    with Film(path) as film:
+    with VideoReader(path) as film:
         return list(film)
 
 
 def written(path: Path, codec: str) -> list[tuple[int, int]]:
-    with EpisodesVideo(path, width_px=WIDTH, height_px=HEIGHT, codec=codec) as video:  # type: ignore[arg-type]
+    with VideoWriter(path, width_px=WIDTH, height_px=HEIGHT, codec=codec) as video:  # type: ignore[arg-type]
         spans = [video.add(pictures(0, 45)), video.add(iter(pictures(100, 30)))]
     return [(s.first_frame, s.frames) for s in spans]
 
@@ -63,7 +63,7 @@ def test_seeking_by_frame_or_by_time_is_exact(tmp_path: Path, codec: str) -> Non
     path = tmp_path / "a.mp4"
     written(path, codec)
     numbers = [*range(45), *range(100, 130)]
-    with Film(path) as film:
+    with VideoReader(path) as film:
         assert film.facts == VideoFacts(75, 20.0, HEIGHT, WIDTH, codec)
         for index in (74, 3, 45, 44, 0, 60):
             assert number_of(film.picture(index)) == numbers[index]
@@ -95,7 +95,7 @@ def test_same_pictures_give_the_same_bytes(tmp_path: Path, codec: str) -> None:
 def test_video_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:
     with (
         pytest.raises(UsageError, match=r"a picture is \(10, 10, 3\) uint8"),
-        EpisodesVideo(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT) as video,
+        VideoWriter(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT) as video,
     ):
         video.add([*pictures(0, 2), np.zeros((10, 10, 3), np.uint8)])
     assert not list(tmp_path.iterdir())
@@ -103,15 +103,15 @@ def test_video_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:
 
 def test_odd_sizes_and_unknown_codecs_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="even, not 95 x 64"):
-        EpisodesVideo(tmp_path / "a.mp4", width_px=95, height_px=64)
+        VideoWriter(tmp_path / "a.mp4", width_px=95, height_px=64)
     with pytest.raises(UsageError, match="video codec 'h264'"):
-        EpisodesVideo(tmp_path / "a.mp4", width_px=96, height_px=64, codec="h264")  # type: ignore[arg-type]
+        VideoWriter(tmp_path / "a.mp4", width_px=96, height_px=64, codec="h264")  # type: ignore[arg-type]
 
 
 def test_default_is_a_codec_that_browsers_play_with_a_licence_that_lets_everybody_carry_it(tmp_path: Path) -> None:
     """AV1 of the main profile (8 bits, 4:2:0), which Chromium and Firefox play; libaom, libavif and dav1d are BSD."""
     path = tmp_path / "a.mp4"
-    with EpisodesVideo(path, width_px=WIDTH, height_px=HEIGHT, codec=PicturesConfig().codec) as video:
+    with VideoWriter(path, width_px=WIDTH, height_px=HEIGHT, codec=PicturesConfig().codec) as video:
         video.add(pictures(0, 3))
     assert video_facts(path).codec == "av1"
     # AV1CodecConfigurationRecord: marker and version, profile and level, tier and depth and monochrome and subsampling
@@ -123,7 +123,7 @@ def test_default_is_a_codec_that_browsers_play_with_a_licence_that_lets_everybod
 @pytest.mark.parametrize("frames", [1, 2, 12, 13, 24, 25])
 def test_group_that_is_cut_short_has_all_its_pictures_and_no_more(tmp_path: Path, frames: int) -> None:
     path = tmp_path / "a.mp4"
-    with EpisodesVideo(path, width_px=WIDTH, height_px=HEIGHT, codec="av1") as video:
+    with VideoWriter(path, width_px=WIDTH, height_px=HEIGHT, codec="av1") as video:
         video.add(pictures(0, frames))
     assert video_facts(path).frames == frames
     assert [number_of(picture) for picture in decoded(path)] == list(range(frames))
@@ -135,7 +135,7 @@ def test_colors_come_back_as_they_were(tmp_path: Path) -> None:
     fields = [(255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255), (200, 120, 40), (10, 10, 10)]
     for i, color in enumerate(fields):
         shown[:, 16 * i : 16 * i + 16] = color
-    with EpisodesVideo(path, width_px=WIDTH, height_px=HEIGHT, codec="av1") as video:
+    with VideoWriter(path, width_px=WIDTH, height_px=HEIGHT, codec="av1") as video:
         video.add([shown] * 4)
     for picture in decoded(path):
         for i, color in enumerate(fields):
@@ -148,15 +148,15 @@ def test_film_that_ends_too_soon_is_refused_where_it_ends(tmp_path: Path) -> Non
     content = path.read_bytes()
     index = content.index(b"moov") - 4
     path.write_bytes(content[:200] + b"\0" * (index - 200) + content[index:])
-    with Film(path) as film, pytest.raises(EpisodesError, match=r"a\.mp4: frame 0 cannot be decoded"):
+    with VideoReader(path) as film, pytest.raises(EpisodesError, match=r"a\.mp4: frame 0 cannot be decoded"):
         film.picture(0)
     clock = content.index(b"mdhd") + 16
     path.write_bytes(content[:clock] + b"\0" * 4 + content[clock + 4 :])
-    with pytest.raises(EpisodesError, match=r"a\.mp4: "), Film(path) as film:
+    with pytest.raises(EpisodesError, match=r"a\.mp4: "), VideoReader(path) as film:
         film.picture(0)
     path.write_bytes(content[: index + 50])
     with pytest.raises(EpisodesError, match=r"a\.mp4: not a readable video"):
-        Film(path)
+        VideoReader(path)
 
 
 def test_build_without_the_encoder_says_which_has_it_and_leaves_nothing(
@@ -178,14 +178,14 @@ def test_build_without_the_encoder_says_which_has_it_and_leaves_nothing(
     ):
         require_encoder("vp9")
     with pytest.raises(UsageError, match="no encoder for vp9"):
-        EpisodesVideo(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT, codec="vp9")
+        VideoWriter(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT, codec="vp9")
     monkeypatch.setattr(features, "check", lambda name: name != "avif")
     with pytest.raises(
         UsageError, match=r"no encoder for av1 \(libavif with libaom\): reinstall pillow.*--codec vp9 or --codec mpeg4"
     ):
         require_encoder("av1")
     with pytest.raises(UsageError, match="no encoder for av1"):
-        EpisodesVideo(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT)
+        VideoWriter(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT)
     assert not list(tmp_path.iterdir())
     require_encoder("mpeg4")
 
@@ -195,7 +195,7 @@ def test_folder_that_cannot_be_written_is_not_taken_for_a_missing_encoder(tmp_pa
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("os.getpid", lambda: 1)
         with pytest.raises(UsageError, match=r"a\.mp4: no video can be written there"):
-            EpisodesVideo(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT)
+            VideoWriter(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT)
 
 
 @pytest.mark.parametrize("suffix", [".webp", ".gif"])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from brick_episodes import START, panda, problem, standing
 
-from manitwin.episodes.episode import world_of
+from manitwin.episodes.episode import create_world
 from manitwin.episodes.execution import IN_HAND, Execution
 from manitwin.episodes.planning.problem import Motion, Phase, PickPlaceProblem
 from manitwin.episodes.settings import EpisodeSettings
@@ -23,7 +23,7 @@ PALM_M, FINGER_END_M = 0.066, 0.1125  # where palm and fingers end, along the ap
 
 
 def made(asked: PickPlaceProblem) -> RobotWorld:
-    return world_of(asked, panda()[0], EpisodeSettings(), 50.0)
+    return create_world(asked, panda()[0], EpisodeSettings(), 50.0)
 
 
 def before_the_hand(depth_m: float) -> np.ndarray:
@@ -54,11 +54,11 @@ def test_what_is_slender_is_held_with_more_rounds_of_the_solver(extents_m: list[
         assert articulation.get_solver_position_iterations() == settings.solver_iterations
         world.expect_load(True)
         assert articulation.get_solver_position_iterations() == factor * settings.solver_iterations_held
-        world.will_hold({other.name})
+        world.set_held_objects({other.name})
         world.expect_load(True)
         assert articulation.get_solver_position_iterations() == settings.solver_iterations_held
-        world.will_hold({other.name, target.name})
-        world.take(0)
+        world.set_held_objects({other.name, target.name})
+        world.set_target(0)
         world.expect_load(True)
         assert articulation.get_solver_position_iterations() == factor * settings.solver_iterations_held, (
             "whichever is taken"

@@ -11,11 +11,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from grasped_twins import write_brick
-from manitwin.engine.stage import StagePart, heard_by
+from manitwin.engine.stage import StagePart, progress_listener
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.collect import batch_folders, collect, stored_episodes
-from manitwin.episodes.episode_pictures import draw_episodes, write_with_pictures
+from manitwin.episodes.episode_pictures import render_batches, write_with_pictures
 from manitwin.episodes.episodes_run import make_episodes
 from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.lerobot.read import read_lerobot
@@ -78,7 +78,7 @@ def test_the_same_seed_gives_the_same_bytes_and_each_attempt_is_told(
     bricks: Path, episodes: Path, tmp_path: Path
 ) -> None:
     told: list[StagePart] = []
-    with heard_by(told.append):
+    with progress_listener(told.append):
         make_episodes(bricks, tmp_path, 6, CONFIG, executor="inline")
     assert told == [StagePart(done, 2, "episodes") for _ in range(3) for done in (1, 2)]
     names = [folder.name for folder in batch_folders(episodes)]
@@ -163,9 +163,9 @@ def test_a_skill_that_no_pair_of_twins_suits_is_said_before_anything_is_made(bri
 def test_pictures_are_drawn_afterwards_and_join_the_set(bricks: Path, tmp_path: Path) -> None:
     make_episodes(bricks, tmp_path, 2, CONFIG, executor="inline")
     config = PicturesConfig(cameras=("front", "wrist"), size_px=64, rate_hz=10)
-    assert draw_episodes(tmp_path, config, executor="inline").exit_code == 0
+    assert render_batches(tmp_path, config, executor="inline").exit_code == 0
     opened: list[int] = []
-    draw_episodes(tmp_path, config, executor="inline", on_start=lambda items, todo: opened.append(todo))
+    render_batches(tmp_path, config, executor="inline", on_start=lambda items, todo: opened.append(todo))
     assert opened == [0]
     written = write_with_pictures(tmp_path, config.cameras, config.rate_hz)
     loaded = read_lerobot(tmp_path / "lerobot", decode_videos=True)
@@ -185,7 +185,7 @@ def test_statistics_of_a_run_name_what_was_kept(episodes: Path) -> None:
 
 def test_folders_without_episodes_are_said(tmp_path: Path) -> None:
     with pytest.raises(EpisodesError, match="manitwin trajectories"):
-        draw_episodes(tmp_path, PicturesConfig(), executor="inline")
+        render_batches(tmp_path, PicturesConfig(), executor="inline")
     with pytest.raises(UsageError, match="manitwin trajectories"):
         collect(tmp_path, ["lerobot"])
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from brick_episodes import START, panda, problem
 
-from manitwin.episodes.episode import world_of
+from manitwin.episodes.episode import create_world
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody
 from manitwin.physics.sapien.body import MAX_DEPENETRATION_M_S
-from manitwin.physics.sapien.falling import AHEAD_M, GENTLY_M_S, Falling
+from manitwin.physics.sapien.free_fall import AHEAD_M, GENTLY_M_S, FreeFallLimiter
 from manitwin.physics.sapien.world import RobotWorld
 from rigid_boxes import box
 
@@ -43,7 +43,7 @@ def dropped(lean_rad: float) -> RobotWorld:
     asked = problem(start=start, target=stick)
     name = "object_00" if asked.target.name != "object_00" else "object_01"
     vessel = PlacedObject(name, "holder", holder(), transform(None, np.array([*foot, 0.0])))
-    return world_of(replace(asked, obstacles=(vessel,)), panda()[0], EpisodeSettings(), 50.0)
+    return create_world(replace(asked, obstacles=(vessel,)), panda()[0], EpisodeSettings(), 50.0)
 
 
 def fastest_up_m_s(world: RobotWorld) -> float:
@@ -65,7 +65,7 @@ def test_a_stick_that_falls_into_a_holder_is_not_thrown_up_again(lean_rad: float
 
 
 def test_one_that_nobody_looks_ahead_for_is_thrown_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Falling, "look", lambda self: None)
+    monkeypatch.setattr(FreeFallLimiter, "look", lambda self: None)
     fastest = []
     for lean_rad in LEANS_RAD:
         with dropped(lean_rad) as world:

@@ -10,7 +10,7 @@ import sapien
 from brick_episodes import panda, problem
 from sapien import physx
 
-from manitwin.episodes.episode import world_of
+from manitwin.episodes.episode import create_world
 from manitwin.episodes.events import PressWatch, StrikeWatch
 from manitwin.episodes.fixtures import PEG_LENGTH_M, Fixture, block, panel, peg_stand
 from manitwin.episodes.goals.evaluation import judge
@@ -18,7 +18,7 @@ from manitwin.episodes.goals.goal import Literal
 from manitwin.episodes.goals.world_state import WorldState
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.geometry.poses import transform
-from manitwin.physics.sapien.contacts import MeantContacts
+from manitwin.physics.sapien.contacts import AllowedContacts
 from manitwin.physics.sapien.world import RobotWorld
 from rigid_boxes import box
 
@@ -29,7 +29,7 @@ STEP_S = EpisodeSettings().timestep_s
 def world_with(fixture: Fixture, start: np.ndarray, mass_kg: float = 0.4) -> RobotWorld:
     """A cube of 4 cm at a pose, and a fixture."""
     asked = problem(start=start, target=box([0.04, 0.04, 0.04], mass_kg))
-    return world_of(replace(asked, fixtures=fixture.boxes), panda()[0], EpisodeSettings(), 50.0)
+    return create_world(replace(asked, fixtures=fixture.boxes), panda()[0], EpisodeSettings(), 50.0)
 
 
 def above(fixture: Fixture, height_m: float, aside_m: float = 0.0) -> np.ndarray:
@@ -94,12 +94,12 @@ def test_what_the_target_touches_counts_only_where_it_is_watched_and_not_meant()
         world.step(30)
         contacts = world.contacts.read()
 
-        def unplanned(meant: MeantContacts) -> set[tuple[str, str]]:
+        def unplanned(meant: AllowedContacts) -> set[tuple[str, str]]:
             return world.contacts.unplanned(contacts, in_hand=True, meant=meant)
 
-        assert unplanned(MeantContacts()) == set()
-        assert unplanned(MeantContacts(target=frozenset({"block"}))) == set()
-        assert unplanned(MeantContacts(target=frozenset({"table"}))) == {("object_01", "block")}
+        assert unplanned(AllowedContacts()) == set()
+        assert unplanned(AllowedContacts(target=frozenset({"block"}))) == set()
+        assert unplanned(AllowedContacts(target=frozenset({"table"}))) == {("object_01", "block")}
 
 
 def test_bodies_without_a_role_are_left_out() -> None:
@@ -110,10 +110,10 @@ def test_bodies_without_a_role_are_left_out() -> None:
         entity = sapien.Entity()
         entity.add_component(sphere)
         entity.pose = sapien.Pose([0.5, 0.1, 0.12 + 0.04 + 0.0099])  # on the cube
-        world.add_strangers([entity])
+        world.add_ignored_bodies([entity])
         world.step(30)
         contacts = world.contacts.read()
-        assert world.contacts.pressing(contacts) == {frozenset({"object_01", "block"})}
+        assert world.contacts.pressing_pairs(contacts) == {frozenset({"object_01", "block"})}
         assert world.contacts.touches(contacts).on_support
         assert world.contacts.unplanned(contacts, in_hand=False) == set()
 

@@ -12,10 +12,10 @@ from synthetic_episodes import attempt
 from grasped_twins import write_brick
 from manitwin.dataset.review.store import REVIEWS, ReviewStore
 from manitwin.dataset.review.verdicts import Review
-from manitwin.episodes.retirement import find_retirements, retire
+from manitwin.episodes.retirement import find_retirements, retire_grasps
 from manitwin.episodes.target_grasps import usable_grasps
 from manitwin.errors import UsageError
-from manitwin.robots.grippers.gripper import load_gripper, of_kind
+from manitwin.robots.grippers.gripper import load_gripper, require_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import TwinSource
@@ -52,7 +52,7 @@ def test_a_retired_grasp_is_marked_and_used_no_more(tmp_path: Path) -> None:
     found = find_retirements(
         [replace(KEPT, outcome="dropped", twin_id=identity, grasp_id="panda-0002")], failed_share=0.5
     )
-    assert retire(twins, found) == 1
+    assert retire_grasps(twins, found) == 1
     after = read_record(folder, verify=True)
     assert after.revision != before.revision
     assert after.model_copy(update={"revision": "", "files": {}}) == before.model_copy(
@@ -65,9 +65,9 @@ def test_a_retired_grasp_is_marked_and_used_no_more(tmp_path: Path) -> None:
     assert "panda-0002" not in twin.grasps().columns["grasp_id"] and len(twin.grasps()) == len(every) - 1
     assert "panda-0002" not in twin.grasps(verified_only=False).columns["grasp_id"]
     assert [every.columns["grasp_id"][at] for at, gone in enumerate(every.columns["retired"]) if gone] == ["panda-0002"]
-    gripper = of_kind(load_gripper("panda"), ParallelGripper)
+    gripper = require_kind(load_gripper("panda"), ParallelGripper)
     assert "panda-0002" not in {each.grasp.grasp_id for each in usable_grasps(twins.twin(identity), gripper)}
-    assert retire(twins, found) == 0
+    assert retire_grasps(twins, found) == 0
     assert read_record(folder).revision == after.revision
 
 
@@ -92,7 +92,7 @@ def test_what_people_said_of_a_twin_stands_when_a_grasp_is_retired(tmp_path: Pat
     with ReviewStore(tmp_path / REVIEWS) as store:
         store.add([said], ["1"])
     dropped = replace(KEPT, outcome="dropped", twin_id=identity, grasp_id="panda-0002")
-    assert retire(twins, find_retirements([dropped], failed_share=0.5)) == 1
+    assert retire_grasps(twins, find_retirements([dropped], failed_share=0.5)) == 1
     with ReviewStore(tmp_path / REVIEWS) as store:
         (stored,) = store.standing()
     assert stored.review.revision == read_record(folder).revision != said.revision

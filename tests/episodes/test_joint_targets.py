@@ -17,7 +17,7 @@ def test_a_cubic_motion_is_met_at_every_timestep_with_its_speed() -> None:
         return 0.3 + 0.7 * time + 2.0 * time**2 - 5.0 * time**3
 
     for number in range(8):
-        rows, speeds = targets.towards(np.array([motion(0.05 * (number + 1))]), 6)
+        rows, speeds = targets.interpolate_to(np.array([motion(0.05 * (number + 1))]), 6)
         assert rows[-1, 0] == pytest.approx(motion(0.05 * (number + 1)))
         if number < 3:
             continue  # which knows nothing of the motion before
@@ -29,7 +29,7 @@ def test_a_cubic_motion_is_met_at_every_timestep_with_its_speed() -> None:
 
 def test_a_jump_is_ended_at_the_actions_and_overshot_by_about_a_quarter_of_it_at_most() -> None:
     targets = JointTargets(np.array([0.0]), *LIMITS)
-    rows = [targets.towards(np.array([end]), 60)[0] for end in (0.0, 1.0, 1.0, 1.0, 1.0)]
+    rows = [targets.interpolate_to(np.array([end]), 60)[0] for end in (0.0, 1.0, 1.0, 1.0, 1.0)]
     assert [each[-1, 0] for each in rows] == [0.0, 1.0, 1.0, 1.0, 1.0]
     assert np.concatenate(rows).max() < 1.26
     assert np.concatenate(rows).min() > -0.26
@@ -38,7 +38,7 @@ def test_a_jump_is_ended_at_the_actions_and_overshot_by_about_a_quarter_of_it_at
 
 def test_what_would_be_beyond_the_limits_of_the_joints_is_clipped_and_stands_there() -> None:
     targets = JointTargets(np.array([0.0]), np.full(1, 0.0), np.full(1, 1.0))
-    found = [targets.towards(np.array([end]), 60) for end in (1.0, 1.0, 0.0)]
+    found = [targets.interpolate_to(np.array([end]), 60) for end in (1.0, 1.0, 0.0)]
     rows, speeds = (np.concatenate(each)[:, 0] for each in zip(*found, strict=True))
     assert rows.max() == 1.0
     assert rows.min() == 0.0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from brick_episodes import GRASPS, START, panda, problem, run, standing
 
-from manitwin.episodes.planning.narrowed_jaws import SPARE_M, STEP_M, narrowed
+from manitwin.episodes.planning.narrowed_jaws import SPARE_M, STEP_M, group_by_opening
 from manitwin.episodes.planning.problem import Phase, PickPlaceProblem
 from manitwin.robots.grippers.gripper import load_gripper
 
@@ -29,12 +29,12 @@ def between_walls() -> PickPlaceProblem:
 def test_each_grasp_has_the_least_step_that_leaves_its_pads_room() -> None:
     widths_m = (0.002, 0.03, 0.02, 0.065)
     grasps = [replace(GRASPS[0], grasp_id=str(place), width_m=width) for place, width in enumerate(widths_m)]
-    found = narrowed(grasps, PANDA)
+    found = group_by_opening(grasps, PANDA)
     assert [[grasp.grasp_id for grasp in group] for group in found] == [["0"], ["2"], ["1"]]  # not as wide as it goes
     for grasp in (grasp for group in found for grasp in group):
         assert grasp.opening_m is not None
         assert SPARE_M <= grasp.opening_m - grasp.width_m < SPARE_M + STEP_M
-    assert narrowed(grasps, load_gripper("suction")) == narrowed(grasps, load_gripper("allegro")) == []
+    assert group_by_opening(grasps, load_gripper("suction")) == group_by_opening(grasps, load_gripper("allegro")) == []
 
 
 def test_open_jaws_are_taken_where_they_have_room() -> None:
@@ -64,5 +64,5 @@ def test_the_next_thing_that_has_room_is_taken_with_open_jaws_again() -> None:
     planner = panda()[1]
     narrow = planner.plan(between_walls()).plan
     assert narrow is not None
-    assert planner.of(narrow.grasp) is planner.of(narrow.grasp) is not planner
-    assert planner.of(GRASPS[0]) is planner.of(None) is planner
+    assert planner.with_opening_of(narrow.grasp) is planner.with_opening_of(narrow.grasp) is not planner
+    assert planner.with_opening_of(GRASPS[0]) is planner.with_opening_of(None) is planner

@@ -15,8 +15,8 @@ from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Grasp, Phase
 from manitwin.episodes.recording import Recording
 from manitwin.episodes.settings import EpisodeSettings
-from manitwin.episodes.skills.hands import check_hand, check_jaws
 from manitwin.episodes.skills.registry import load_skill
+from manitwin.episodes.skills.robot_compatibility import check_hand, check_jaws
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper

@@ -19,11 +19,11 @@ from manitwin.episodes.tasks.tasks_run import make_tasks
 from manitwin.errors import UsageError
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
 from manitwin.scenes.layouts.layouts_run import make_layouts
-from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.layouts.pool import cached_pool
 from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 
 NAME = "my_jaws"
 
@@ -50,7 +50,7 @@ def write_own(root: Path, number: int, gripper: Gripper) -> str:
     record = json.loads((folder / RECORD).read_bytes())
     record["grasps"] |= {"gripper": gripper.name, "gripper_sha256": gripper.sha256}
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
     return identity
 
 
@@ -108,8 +108,8 @@ def test_runs_refuse_scenes_whose_twins_stand_otherwise_now(twins: tuple[Path, s
     record = json.loads((folder / RECORD).read_bytes())
     record["physical"]["mass_kg"] |= dict.fromkeys(("value", "low", "high"), 0.5)
     del record["revision"], record["files"]
-    seal(folder, record)
-    pool_of.cache_clear()
+    write_twin_record(folder, record)
+    cached_pool.cache_clear()
     refused = (
         rf"{identity} \(brick\) changed in shape, mass, contact or placements .* in 1 of 1 scene; sample the layouts"
     )

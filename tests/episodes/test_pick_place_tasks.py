@@ -25,7 +25,7 @@ from manitwin.twin.record import Language
 from scene_twins import pool_of_things
 
 POOL = pool_of_things()
-PLACEABLES = [Placeable.of(POOL, twin) for twin in POOL.twins]
+PLACEABLES = [Placeable.in_likeliest_placement(POOL, twin) for twin in POOL.twins]
 ROOM = PlacingArea(Workspace(0.35, 0.68, 0.9), make_furniture("table", np.random.default_rng(0)).supports[0])
 
 
@@ -36,7 +36,7 @@ def test_everything_stands_on_the_table_apart_from_each_other(seed: int) -> None
     task = sample_task(target, lambda: PLACEABLES[int(rng.integers(len(PLACEABLES)))], 5, ROOM, rng)
     assert task is not None and len(task.objects) == 6
     goal = task.goal_object_to_world
-    assert np.linalg.norm((task.way_m[1] - task.way_m[0])[:2]) >= MIN_MOVE_M
+    assert np.linalg.norm((task.start_and_goal_m[1] - task.start_and_goal_m[0])[:2]) >= MIN_MOVE_M
     poses = [*((o.body, o.object_to_world) for o in task.objects), (task.objects[0].body, goal)]
     clouds = [transform_points(pose, np.concatenate(body.hulls)) for body, pose in poses]
     low, high = (np.add(ROOM.support.center_m, sign * np.array(ROOM.support.half_extents_m)) for sign in (-1, 1))
@@ -81,7 +81,7 @@ def test_what_lies_goes_far_enough_by_its_middle(lying_bar: PlacedObject) -> Non
     for _ in range(200):
         goal = free_goal((lying_bar,), 0, ROOM, rng)
         assert goal is not None
-        start_m, goal_m = PickPlaceTask((lying_bar,), 0, goal).way_m
+        start_m, goal_m = PickPlaceTask((lying_bar,), 0, goal).start_and_goal_m
         assert np.linalg.norm((goal_m - start_m)[:2]) >= MIN_MOVE_M
         assert 0.35 <= np.linalg.norm(goal_m[:2]) <= 0.68  # it is within reach by its middle too
 
@@ -89,7 +89,7 @@ def test_what_lies_goes_far_enough_by_its_middle(lying_bar: PlacedObject) -> Non
 def test_the_way_of_what_is_turned_is_told_by_its_middle(lying_bar: PlacedObject) -> None:
     turned = transform(Rotation.from_euler("z", 180, degrees=True).as_matrix())
     goal = transform(translation=np.array([1.0, 0.2, 0.0])) @ turned @ lying_bar.object_to_world
-    start_m, goal_m = PickPlaceTask((lying_bar,), 0, goal).way_m
+    start_m, goal_m = PickPlaceTask((lying_bar,), 0, goal).start_and_goal_m
     np.testing.assert_allclose(start_m, [0.52, 0, 0.02], atol=1e-12)
     np.testing.assert_allclose(goal_m, [0.48, 0.2, 0.02], atol=1e-12)  # the origin goes from x = 0.4 to 0.6
     language = Language(

@@ -31,7 +31,7 @@ from manitwin.episodes.lerobot.read import read_lerobot
 from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import TwinSource
-from manitwin.twin.store import RECORD, digests_below, seal
+from manitwin.twin.store import RECORD, digests_below, write_twin_record
 
 
 def files_below(root: Path) -> Iterator[Path]:
@@ -160,4 +160,4 @@ def amend(twins: Path, twin_id: str) -> None:
     record = json.loads((folder / RECORD).read_bytes())
     record["language"]["caption"] += " Amended."
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)

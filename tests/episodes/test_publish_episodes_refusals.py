@@ -18,7 +18,7 @@ from manitwin.episodes.episode_pictures import PICTURES_RECORD, batch_name
 from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
-from manitwin.twin.store import RECORD, digests_below, seal
+from manitwin.twin.store import RECORD, digests_below, write_twin_record
 
 app = typer.Typer()
 app.command()(publish)
@@ -31,7 +31,7 @@ def test_episodes_of_a_rehearsals_twin_stay_unless_they_are_asked_for(run: Path,
     record = json.loads((folder / RECORD).read_bytes())
     record["provenance"]["stages"]["points"]["rehearsal"] = True
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
     arguments = [str(run), "-o", str(tmp_path / "out"), "--twins", str(place), "--license-allow"]
     done = CliRunner().invoke(app, [*arguments, ",".join(LICENCES.values())])
     assert done.exit_code == 0, done.output

@@ -22,7 +22,7 @@ from manitwin.episodes.replay_pictures import (
     link_tolerance_m,
     object_tolerance_m,
 )
-from manitwin.episodes.robot_looks import link_drawables, link_visuals
+from manitwin.episodes.robot_appearance import link_drawables, link_visuals
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform, transform_points
 from manitwin.geometry.ray_caster import RayCaster

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.episodes import robot_looks
-from manitwin.episodes.robot_looks import link_drawables, looks_folder
+from manitwin.episodes import robot_appearance
+from manitwin.episodes.robot_appearance import link_drawables, looks_folder
 from manitwin.render.drawable import Drawable
 from manitwin.render.drawable_file import ARRAYS, drawables_from_bytes, drawables_to_bytes
 
@@ -59,7 +59,7 @@ def same(one: dict[str, Drawable], other: dict[str, Drawable]) -> bool:
 def test_what_is_read_again_is_what_was_made(arm: str, monkeypatch: pytest.MonkeyPatch) -> None:
     made = looks(arm)
     assert len(kept()) == 1
-    monkeypatch.setattr(robot_looks, "link_visuals", lambda urdf: pytest.fail("the meshes were read again"))
+    monkeypatch.setattr(robot_appearance, "link_visuals", lambda urdf: pytest.fail("the meshes were read again"))
     assert same(looks(arm), made)
 
 
@@ -69,9 +69,9 @@ def test_another_mesh_tolerance_or_version_is_made_anew(
     first = looks(arm)
     assert not same(looks(arm, 2 * TOLERANCE_M), first) and len(kept()) == 2
     trimesh.creation.icosphere(subdivisions=4, radius=0.2).export(tmp_path / "link.stl")
-    robot_looks.link_visuals.cache_clear()  # of this process, which reads a file once
+    robot_appearance.link_visuals.cache_clear()  # of this process, which reads a file once
     assert np.ptp(looks(arm)["base"].shadow.vertices[:, 0]) == pytest.approx(0.4, abs=0.01)
-    monkeypatch.setattr(robot_looks, "LOOKS_VERSION", "another")
+    monkeypatch.setattr(robot_appearance, "LOOKS_VERSION", "another")
     looks(arm)
     assert len(kept()) == 4
 

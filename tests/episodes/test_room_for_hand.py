@@ -6,10 +6,10 @@ import numpy as np
 
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.room_for_hand import (
-    begins_for_two_hands,
-    begins_that_lead_there,
-    begins_with_room,
+    feasible_start_placements,
+    handover_start_placements,
     placement_with_room,
+    start_placements_with_room,
 )
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.geometry.poses import transform
@@ -76,24 +76,26 @@ FROM_Y, FROM_Z = jaws([0, -1, 0], [0, 0, 1]), jaws([0, 0, -1], [0, 1, 0])
 
 def test_a_bar_begins_where_a_grasp_leads_to_its_end_at_once_or_by_another_placement() -> None:
     def begins(*ways: StandingPose, grasps: tuple[Grasp, ...] = (FROM_Y, FROM_Z)) -> list[StandingPose]:
-        return begins_with_room([ON_SIDE], [FLAT], ways, grasps, JAWS, BAR)
+        return start_placements_with_room([ON_SIDE], [FLAT], ways, grasps, JAWS, BAR)
 
     assert begins(FLAT) == []  # from +Y it is lifted, from +Z it is laid flat: no grasp does both
     assert begins(FLAT, ON_END) == [ON_SIDE]
     assert begins(ON_END, grasps=(FROM_Y,)) == []
-    assert begins_with_room([ON_END], [FLAT], (), (FROM_Y, FROM_Z), JAWS, BAR) == [ON_END]
+    assert start_placements_with_room([ON_END], [FLAT], (), (FROM_Y, FROM_Z), JAWS, BAR) == [ON_END]
 
 
 def test_what_is_too_heavy_for_a_grasp_at_its_end_does_not_begin_lying() -> None:
     heavy = box([LONG_M, WIDE_M, WIDE_M], 2.0, 0.6)
     both = ([ON_SIDE], [ON_END], (), (FROM_Y,), JAWS)
-    assert begins_with_room(*both, BAR) == [ON_SIDE]
-    assert begins_with_room(*both, heavy) == []
+    assert start_placements_with_room(*both, BAR) == [ON_SIDE]
+    assert start_placements_with_room(*both, heavy) == []
 
 
 def two_hands(*grasps: Grasp, begin: StandingPose = ON_SIDE, mass_kg: float = 0.2) -> list[StandingPose]:
     """The placements from which the bar is handed over, that it lies in on two sides."""
-    return begins_for_two_hands([begin], [ON_SIDE, FLAT], grasps, JAWS, box([LONG_M, WIDE_M, WIDE_M], mass_kg, 0.6))
+    return handover_start_placements(
+        [begin], [ON_SIDE, FLAT], grasps, JAWS, box([LONG_M, WIDE_M, WIDE_M], mass_kg, 0.6)
+    )
 
 
 def test_a_bar_is_handed_over_where_one_hand_can_lift_and_another_beside_it_put_down() -> None:
@@ -112,5 +114,5 @@ def test_a_bar_is_handed_over_where_one_hand_can_lift_and_another_beside_it_put_
 def test_only_what_takes_two_arms_asks_for_two_hands() -> None:
     bar = PoolTwin("t", "0", "bar", (ON_SIDE, FLAT), False, ())
     for skill, expected in (("handover", []), ("lift", None)):
-        found = begins_that_lead_there(SKILLS[skill], bar, BAR, lambda: [FROM_Y], JAWS)
+        found = feasible_start_placements(SKILLS[skill], bar, BAR, lambda: [FROM_Y], JAWS)
         assert found == (SKILLS[skill].begins_in(bar) if expected is None else expected)

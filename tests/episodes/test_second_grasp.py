@@ -9,13 +9,13 @@ import pytest
 from brick_episodes import GRASPS, panda, problem, run
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.courses.course import NotTaken, Start
+from manitwin.episodes.courses.course import EpisodeStart, GraspFailed
 from manitwin.episodes.courses.pick_place import PickPlaceCourse
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.geometry.poses import transform
-from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
+from manitwin.physics.sapien.contacts import NONE_MEANT, AllowedContacts
 from rigid_boxes import above
 
 IN_THE_AIR = tuple(Grasp(f"air{i}", above([0, 0.005 * i, 0.066]), 0.04) for i in range(3))
@@ -52,7 +52,7 @@ class Held:
 
     def __init__(self, gripper_to_object: np.ndarray, turned_rad: float):
         self.done: list[str] = []
-        self.meant = MeantContacts(target=frozenset())
+        self.meant = AllowedContacts(target=frozenset())
         self.commanded_rad = np.zeros(7)
         self._measured = gripper_to_object @ transform(Rotation.from_euler("x", turned_rad).as_matrix())
 
@@ -63,7 +63,7 @@ class Held:
         self.done.append(motion.phase.name)
         return True
 
-    def open(self) -> None:
+    def open_hand(self) -> None:
         self.done.append("OPEN")
 
 
@@ -73,17 +73,17 @@ def test_what_has_turned_far_is_set_down_where_it_was_once(turned_deg: float, tr
     planner, grasp = panda()[1], GRASPS[0]
     facts = EpisodeFacts()
     facts.replans["another_grasp"] = tried_before
-    course = PickPlaceCourse(Start(asked, (asked.target,), planner, EpisodeSettings(), None), facts)
+    course = PickPlaceCourse(EpisodeStart(asked, (asked.target,), planner, EpisodeSettings(), None), facts)
     plan = planner.plan(asked).plan
     assert plan is not None
     execution = Held(plan.gripper_to_object, np.radians(turned_deg))
     execution.commanded_rad = plan.lift.positions_rad[-1]
     if turned_deg < 10 or tried_before:
-        course.set_down_again(plan, execution)  # type: ignore[arg-type]
+        course.put_back_if_turned(plan, execution)  # type: ignore[arg-type]
         assert execution.done == []
         return
-    with pytest.raises(NotTaken, match="replan_failed"):
-        course.set_down_again(plan, execution)  # type: ignore[arg-type]
+    with pytest.raises(GraspFailed, match="replan_failed"):
+        course.put_back_if_turned(plan, execution)  # type: ignore[arg-type]
     assert execution.done == ["CARRY", "LOWER", "OPEN", "RETREAT"]
     assert execution.meant == NONE_MEANT  # it may touch the table again
     assert grasp.grasp_id == plan.grasp.grasp_id

@@ -24,10 +24,10 @@ from publishable_run import write_run, write_twins
 import manitwin
 import manitwin.cli.main as main_module
 from grasped_twins import write_brick
-from manitwin.cli.causes import causes_of
+from manitwin.cli.causes import read_causes
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.episodes.collect import batch_folders, collect, stored_episodes
-from manitwin.episodes.episode_pictures import draw_episodes
+from manitwin.episodes.episode_pictures import render_batches
 from manitwin.episodes.episodes_run import make_episodes
 from manitwin.episodes.lerobot.read import read_lerobot
 from manitwin.episodes.publication.publish import publish_episodes
@@ -212,7 +212,7 @@ def api_of(root: Path, out: Path) -> dict[str, dict[str, Callable[[], object]]]:
             "read_lerobot": lambda: read_lerobot(episodes / "lerobot"),
             "make_episodes": lambda: make_episodes(root / "bricks", episodes, 2, EPISODES, executor="inline"),
         },
-        "run": {"draw_episodes": lambda: draw_episodes(run, PicturesConfig(size_px=64), executor="inline")},
+        "run": {"draw_episodes": lambda: render_batches(run, PicturesConfig(size_px=64), executor="inline")},
         "published": {"read_lerobot": lambda: read_lerobot(root / "published", decode_videos=True)},
     }
 
@@ -327,6 +327,6 @@ def test_each_file_with_each_damage_is_refused_in_one_line_or_not_needed(
 def test_episode_that_does_not_say_where_it_took_place_is_not_drawn(sound: Path, tmp_path: Path) -> None:
     run = Path(shutil.copytree(sound / "run", tmp_path / "run"))
     shutil.rmtree(run / "pictures")
-    assert draw_episodes(run, PicturesConfig(size_px=64), executor="inline").exit_code == 4
-    said = [cause.message for cause in causes_of(str(run / "pictures"))]
+    assert render_batches(run, PicturesConfig(size_px=64), executor="inline").exit_code == 4
+    said = [cause.message for cause in read_causes(str(run / "pictures"))]
     assert said and all("facts.furniture: Field required" in line for line in said)

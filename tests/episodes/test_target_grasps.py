@@ -13,14 +13,16 @@ import pytest
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.target_grasps import TargetGrasp, shuffled, usable_grasps
 from manitwin.geometry.poses import transform
-from manitwin.robots.grippers.gripper import load_gripper, of_kind
+from manitwin.robots.grippers.gripper import load_gripper, require_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.grasp_table import SCHEMA
 from manitwin.twin.loaded_twin import Twin
 from rigid_boxes import FROM_ABOVE, above
 from twin_folders import write_accepted
 
-PANDA, WSG, ROBOTIQ = (of_kind(load_gripper(name), ParallelGripper) for name in ("panda", "wsg50_110", "robotiq_2f85"))
+PANDA, WSG, ROBOTIQ = (
+    require_kind(load_gripper(name), ParallelGripper) for name in ("panda", "wsg50_110", "robotiq_2f85")
+)
 DOWN_WXYZ = [0.0, 1.0, 0.0, 0.0]  # FROM_ABOVE
 
 

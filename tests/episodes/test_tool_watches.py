@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from brick_episodes import panda, problem
 
-from manitwin.episodes.episode import world_of
+from manitwin.episodes.episode import create_world
 from manitwin.episodes.goals.evaluation import judge
 from manitwin.episodes.goals.goal import Literal
 from manitwin.episodes.goals.world_state import ObjectState, WorldState
@@ -16,7 +16,7 @@ from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.tool_watches import AimWatch, CutWatch, PushWatch, StirWatch, WipeWatch
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import transform
-from manitwin.physics.sapien.contacts import ContactReader, Push
+from manitwin.physics.sapien.contacts import ContactReader, ResultantForce
 from rigid_boxes import box
 
 STEP_S = 1 / 120
@@ -68,7 +68,7 @@ def test_a_brick_that_slides_wipes_by_its_weight_where_it_comes(
     asked = replace(asked, target=replace(asked.target, body=box([0.04, 0.06, 0.04], mass_kg, 0.3)))
     face = transform(np.diag([1.0, down, down]))[None]
     patch, half_m = transform(None, np.array([0.49, 0, 0.0])), np.array([0.05, 0.025])
-    with world_of(asked, panda()[0], EpisodeSettings(), 50.0) as world:
+    with create_world(asked, panda()[0], EpisodeSettings(), 50.0) as world:
         points = np.concatenate(world.placed[0].body.hulls)
         watch = WipeWatch("tool", "table", "patch", patch, half_m, points, lambda: world.object_to_world(0), face)
         for _ in range(48):
@@ -80,7 +80,7 @@ def test_a_brick_that_slides_wipes_by_its_weight_where_it_comes(
 
 
 def test_a_push_is_touched_by_whom_it_is_asked_of_and_tells_how_high_it_rose() -> None:
-    with world_of(problem(), panda()[0], EpisodeSettings(), 50.0) as world:
+    with create_world(problem(), panda()[0], EpisodeSettings(), 50.0) as world:
 
         def center() -> np.ndarray:
             return world.object_to_world(0)[:3, 3]
@@ -102,8 +102,8 @@ class Touches:
 
     touched: bool = False
 
-    def push(self, contacts: object, subject: str, by: frozenset[str]) -> Push | None:
-        return Push(np.array([1.0, 0, 0]), np.zeros(3)) if self.touched else None
+    def resultant_force(self, contacts: object, subject: str, by: frozenset[str]) -> ResultantForce | None:
+        return ResultantForce(np.array([1.0, 0, 0]), np.zeros(3)) if self.touched else None
 
 
 def looked_at(watch: PushWatch, at: np.ndarray, way: list[tuple[float, float, bool, float]]) -> None:

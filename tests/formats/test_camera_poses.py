@@ -42,9 +42,9 @@ def test_a_lens_may_be_an_angle_and_each_frame_may_have_its_own(tmp_path: Path) 
     frames = [{"file_path": "./r_0", "transform_matrix": POSES[0].tolist()[:3]}]
     frames.append({"file_path": "r_1", "transform_matrix": POSES[1].tolist(), "fl_x": 50, "w": 60, "h": 40})
     found = read_camera_poses(_written(tmp_path, {"camera_angle_x": 0.8, "frames": frames})).cameras
-    assert found[0].lens.of_picture(640, 480).focal == pytest.approx((320 / np.tan(0.4),) * 2)
-    assert found[0].lens.of_picture(640, 480).centre_px == (320, 240)
-    assert found[1].lens.of_picture(640, 480) == Lens((50, 50), (30, 20), (60, 40))
+    assert found[0].lens.with_picture_size(640, 480).focal == pytest.approx((320 / np.tan(0.4),) * 2)
+    assert found[0].lens.with_picture_size(640, 480).centre_px == (320, 240)
+    assert found[1].lens.with_picture_size(640, 480) == Lens((50, 50), (30, 20), (60, 40))
     fisheye = {"camera_model": "OPENCV_FISHEYE", "k1": 0.1, **transforms_document(POSES)}
     assert read_camera_poses(_written(tmp_path, fisheye)).cameras[0].lens.distortion == (0.1, 0, 0, 0)
 
@@ -54,7 +54,8 @@ def test_a_focal_length_of_a_frame_takes_the_place_of_all_that_the_file_says_of_
     document["frames"][0] |= {"fl_x": 200}
     document["frames"][1] |= {"camera_angle_x": 0.8}
     lenses = [
-        camera.lens.of_picture(WIDTH, HEIGHT) for camera in read_camera_poses(_written(tmp_path, document)).cameras
+        camera.lens.with_picture_size(WIDTH, HEIGHT)
+        for camera in read_camera_poses(_written(tmp_path, document)).cameras
     ]
     assert [lens.focal for lens in lenses] == [
         (200, 200),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fbx_document import fbx_box
-from manitwin.formats.fbx_names import beside, embedded_files, fbx_file_names
+from manitwin.formats.fbx_names import embedded_files, fbx_file_names, relative_name
 from manitwin.formats.source_files import named_files, side_files
 from manitwin.pipeline.item import Item, twin_id
 
@@ -23,7 +23,7 @@ from manitwin.pipeline.item import Item, twin_id
     ],
 )
 def test_names_of_other_machines_count_by_their_last_part(name: str, there: str) -> None:
-    assert beside(name) == there
+    assert relative_name(name) == there
 
 
 def test_names_are_found_in_text_and_in_bytes() -> None:

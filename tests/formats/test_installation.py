@@ -92,7 +92,7 @@ def test_a_command_that_wants_a_missing_library_ends_in_one_line(
 
 def test_the_doctor_names_the_packages_of_missing_libraries(monkeypatch: pytest.MonkeyPatch, wheel: Path) -> None:
     monkeypatch.setattr(doctor.sysconfig, "get_path", lambda name: str(wheel))
-    (finding,) = [each for each in doctor.examine() if each.name == "shared libraries"]
+    (finding,) = [each for each in doctor.check_installation() if each.name == "shared libraries"]
     assert (
         not finding.ok
         and "libQ.so.6" in finding.detail
@@ -106,15 +106,15 @@ def test_an_import_that_fails_for_another_reason_keeps_its_own_remedy() -> None:
 
 def test_a_library_that_is_left_out_is_not_found_and_comes_back() -> None:
     program = """
-from manitwin.formats.installation import left_out
+from manitwin.formats.installation import block_import
 import sys
-with left_out("wave"):
+with block_import("wave"):
     try:
         import wave
     except ModuleNotFoundError as error:
         print(error.name)
 import wave
-with left_out("wave"):
+with block_import("wave"):
     import wave as again
 print(again is sys.modules["wave"])
 """
@@ -124,24 +124,24 @@ print(again is sys.modules["wave"])
 
 def test_a_library_that_is_put_off_is_loaded_once_something_of_it_is_used() -> None:
     program = """
-from manitwin.formats.installation import put_off
+from manitwin.formats.installation import defer_import
 import sys
-put_off("xml", "Reader")
-put_off("no_such_library")
+defer_import("xml", "Reader")
+defer_import("no_such_library")
 import xml
 from xml import Reader
 print(type(xml).__name__, Reader.__name__, "no_such_library" in sys.modules)
 print(xml.__all__, type(xml).__name__)
 from xml.dom import minidom
 print(minidom.__name__)
-put_off("json")
+defer_import("json")
 import json
 print(type(json).__name__)
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == [
-        "_PutOff Reader False",
+        "_LazyModule Reader False",
         "['dom', 'parsers', 'sax', 'etree'] module",
         "xml.dom.minidom",
-        "_PutOff",
+        "_LazyModule",
     ]

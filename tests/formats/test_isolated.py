@@ -16,7 +16,7 @@ from manitwin.formats.isolated import (
     MAX_MEMORY_BYTES,
     Limits,
     ProcessCrashed,
-    TookTooLong,
+    ProcessTimeout,
     iterate_isolated,
     run_isolated,
 )
@@ -85,7 +85,7 @@ def test_a_forked_process_starts_a_worker_of_its_own() -> None:
 )
 def test_a_call_that_does_not_end_is_ended(function: str, arguments: tuple[object, ...]) -> None:
     limits = Limits(seconds=0.5)
-    with pytest.raises(TookTooLong, match=rf"{function} took longer than 0.5 s"):
+    with pytest.raises(ProcessTimeout, match=rf"{function} took longer than 0.5 s"):
         run_isolated(function, *arguments, limits=limits)
     assert run_isolated("builtins:abs", -1, limits=limits) == 1
 
@@ -109,7 +109,7 @@ def test_many_calls_are_answered_in_order_and_one_costs_itself_alone() -> None:
 
 def test_a_slow_call_among_many_is_told_from_its_neighbours() -> None:
     answers = list(iterate_isolated("time:sleep", [0.0] * 300 + [0.2, 1000.0, 0.0], Limits(seconds=0.5)))
-    assert [isinstance(value, TookTooLong) for _, (_, value) in answers] == [False] * 301 + [True, False]
+    assert [isinstance(value, ProcessTimeout) for _, (_, value) in answers] == [False] * 301 + [True, False]
 
 
 def test_a_worker_that_somebody_killed_is_replaced() -> None:

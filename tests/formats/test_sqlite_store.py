@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from manitwin.errors import UsageError
-from manitwin.formats.sqlite_store import errors_named, flaw_in, transaction
+from manitwin.formats.sqlite_store import name_file_in_errors, schema_flaw, transaction
 
 REMEDY = "is no list that can be read ({cause}); give another"
 
@@ -47,15 +47,15 @@ def test_nothing_of_a_block_that_fails_is_kept(connection: sqlite3.Connection, e
 def test_errors_of_the_disk_and_of_the_file_say_which_file(connection: sqlite3.Connection) -> None:
     path = Path("list.sqlite")
     disk = r"^list\.sqlite: no such table: other; mend the disk or its permissions"
-    with pytest.raises(UsageError, match=disk), errors_named(path, REMEDY):
+    with pytest.raises(UsageError, match=disk), name_file_in_errors(path, REMEDY):
         connection.execute("SELECT * FROM other")
     file = r"^list\.sqlite: is no list that can be read \(UNIQUE.*\); give another$"
-    with pytest.raises(UsageError, match=file), errors_named(path, REMEDY), transaction(connection):
+    with pytest.raises(UsageError, match=file), name_file_in_errors(path, REMEDY), transaction(connection):
         connection.executemany("INSERT INTO rows VALUES (?)", [("a",), ("a",)])
     assert _count(connection) == 0
 
 
 def test_a_database_with_more_than_its_tables_has_a_flaw(connection: sqlite3.Connection) -> None:
-    assert flaw_in(connection, _made, tables_of="a list") is None
+    assert schema_flaw(connection, _made, tables_of="a list") is None
     connection.execute("CREATE VIEW other AS SELECT * FROM rows")
-    assert flaw_in(connection, _made, tables_of="a list") == "its tables do not match those of a list"
+    assert schema_flaw(connection, _made, tables_of="a list") == "its tables do not match those of a list"

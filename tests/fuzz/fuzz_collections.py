@@ -13,7 +13,7 @@ from fuzz_datasets import command, dataset
 from fuzz_target import Case, target
 from PIL import Image
 
-from manitwin.dataset.collect.intake import Given, add
+from manitwin.dataset.collect.intake import DefaultValues, add_inputs
 from manitwin.dataset.collect.status import catalogue_status
 from manitwin.dataset.review.store import ReviewStore, reviews_path
 from manitwin.dataset.review.verdict_files import read_verdicts
@@ -53,7 +53,7 @@ def lists(folder: Path) -> None:
 def catalogue(folder: Path) -> None:
     lists(folder)
     for name in ("list.csv", "list.jsonl"):
-        add(folder / "catalogue.sqlite", folder / name, Given())
+        add_inputs(folder / "catalogue.sqlite", folder / name, DefaultValues())
 
 
 def listings(folder: Path) -> None:
@@ -66,7 +66,7 @@ def listings(folder: Path) -> None:
 
 
 def take_in(case: Case) -> None:
-    add(case.folder / "catalogue.sqlite", case.file, Given(source="own"))
+    add_inputs(case.folder / "catalogue.sqlite", case.file, DefaultValues(source="own"))
     catalogue_status(case.folder / "catalogue.sqlite")
 
 
@@ -75,7 +75,7 @@ def use_catalogue(case: Case) -> None:
     for line in catalogue_status(path).lines():
         assert "\x1b" not in line
     command("collect", "plan", path, "-o", case.folder / "plan", "--items", 4)
-    add(path, case.folder / "list.csv", Given())
+    add_inputs(path, case.folder / "list.csv", DefaultValues())
 
 
 def reviewed(folder: Path) -> None:

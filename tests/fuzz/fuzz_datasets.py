@@ -15,7 +15,7 @@ from manitwin.dataset.index.parts import write_part
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.index.rows import rows_of
 from manitwin.dataset.statistics.query import ReportTables
-from manitwin.dataset.statistics.report import collect
+from manitwin.dataset.statistics.report import run_queries
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.pipeline.item import Item
@@ -89,7 +89,7 @@ def rows(case: Case) -> None:
 
 
 def statistics(case: Case) -> None:
-    collect(ReportTables.of_index(DatasetRoot(case.folder)))
+    run_queries(ReportTables.of_index(DatasetRoot(case.folder)))
 
 
 INDEX = ("index/*", "index/*/*", "*.parquet", "index*.json")

@@ -10,10 +10,10 @@ from fuzz_target import Case, target
 from lerobot_sets import written
 from synthetic_episodes import attempt, episode, with_granules
 
-from manitwin.episodes.attempts import read_attempts, success_of, write_attempts
+from manitwin.episodes.attempts import count_attempts, read_attempts, write_attempts
 from manitwin.episodes.hdf5_file import EpisodeFile, write_episodes
 from manitwin.episodes.lerobot.read import read_lerobot
-from manitwin.episodes.recording_arrays import checked
+from manitwin.episodes.recording_arrays import checked_recording
 from manitwin.errors import EpisodesError
 from manitwin.web.episode_document import episode_document
 from manitwin.web.episode_folders import EpisodeFolders
@@ -36,8 +36,8 @@ def hdf5(folder: Path) -> None:
 def read_hdf5(case: Case) -> None:
     with EpisodeFile(case.file) as file:
         for number in range(len(file)):
-            file.said(number)
-            checked(file[number])
+            file.metadata(number)
+            checked_recording(file[number])
 
 
 def shown(folder: Path) -> None:
@@ -73,5 +73,5 @@ def attempts(folder: Path) -> None:
 
 target("hdf5", hdf5, read_hdf5)
 target("lerobot", lerobot, read_set, files=("*.json", "*.parquet", "*.jsonl"), weight=0.5)
-target("attempts", attempts, lambda case: success_of(read_attempts(case.file)))
+target("attempts", attempts, lambda case: count_attempts(read_attempts(case.file)))
 target("shown_episodes", shown, show, files=("*.h5", "*.parquet"), weight=0.3)

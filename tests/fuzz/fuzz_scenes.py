@@ -20,7 +20,7 @@ from manitwin.errors import BadReply
 from manitwin.formats.json_file import read_json_object
 from manitwin.formats.label_picture import label_picture
 from manitwin.models.pose_estimators.protocol import parse_guesses
-from manitwin.scenes.locate.base_file import read_base
+from manitwin.scenes.locate.hand_eye_file import read_camera_to_base
 from manitwin.scenes.locate.input_files import read_cloud, read_view
 from manitwin.scenes.perception.scene_truth import read_scene_truth
 from manitwin.scenes.scene_files import scene_files
@@ -88,7 +88,7 @@ def base(folder: Path) -> None:
 
 
 def read_camera_pose(case: Case) -> None:
-    pose = read_base(case.file)
+    pose = read_camera_to_base(case.file)
     assert np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-9)
 
 

@@ -42,7 +42,7 @@ from manitwin.models.graspers.grasp_server import GraspServer, pack, unpack
 from manitwin.models.graspers.graspgen import GraspGenGrasper
 from manitwin.models.graspers.graspgenx import GraspGenXGrasper
 from manitwin.models.graspers.protocol import GraspRequest
-from manitwin.models.vlm.answer_cache import Cached
+from manitwin.models.vlm.answer_cache import CachedChat
 from manitwin.models.vlm.anthropic_messages import AnthropicMessages
 from manitwin.models.vlm.openai_chat import OpenAiChat
 from manitwin.models.vlm.protocol import Picture, Question, Reply, Turn, Usage, question_digest
@@ -298,7 +298,7 @@ class Silent:
 
 
 def kept_answers(folder: Path) -> None:
-    Cached(Silent(), folder).ask(question())  # type: ignore[arg-type]
+    CachedChat(Silent(), folder).ask(question())  # type: ignore[arg-type]
 
 
 def replays(folder: Path) -> None:
@@ -311,5 +311,5 @@ def replays(folder: Path) -> None:
     )
 
 
-target("answer-cache", kept_answers, lambda case: Cached(Silent(), case.folder).ask(question()), files=("*.json",))  # type: ignore[arg-type]
+target("answer-cache", kept_answers, lambda case: CachedChat(Silent(), case.folder).ask(question()), files=("*.json",))  # type: ignore[arg-type]
 target("replay", replays, lambda case: Replay(case.file).ask(question()))

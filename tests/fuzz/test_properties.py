@@ -19,7 +19,7 @@ from manitwin.formats.printable import printable, printable_line
 from manitwin.formats.source_files import inside_folder, map_file_name, spellings
 from manitwin.formats.toml_file import parse_toml
 from manitwin.models.services.keys import redacted, split_url
-from manitwin.models.services.refusal import refusal_by_status, retry_after_s, words_of
+from manitwin.models.services.refusal import error_message, refusal_by_status, retry_after_s
 from manitwin.models.vlm.structured import json_object_in
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -158,7 +158,7 @@ def test_an_answer_holds_an_object_or_is_refused(text: str) -> None:
 @each
 @given(st.integers(100, 599), VALUES)
 def test_every_body_of_a_refusal_is_told(status: int, body: Any) -> None:
-    assert isinstance(words_of(body), str)
+    assert isinstance(error_message(body), str)
     refusal_by_status(status, body)
 
 

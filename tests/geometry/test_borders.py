@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.geometry.solids.borders import with_border
+from manitwin.geometry.solids.borders import cut_along_border
 from manitwin.geometry.solids.parts import Assembly, PartedMesh
 from manitwin.geometry.solids.shapes import box, cylinder, ellipsoid
 
@@ -73,7 +73,7 @@ def test_nothing_is_cut_of_faces_that_are_not_chosen() -> None:
     solid = trimesh.creation.box(extents=(1.0, 1.0, 1.0))
     faces = np.asarray(solid.faces)
     chosen = np.zeros(len(faces), dtype=bool)
-    vertices, cut, origin, within = with_border(np.asarray(solid.vertices), faces, chosen, lambda c: c[:, 0] > 0.1)
+    vertices, cut, origin, within = cut_along_border(np.asarray(solid.vertices), faces, chosen, lambda c: c[:, 0] > 0.1)
     assert len(vertices) == 8 and np.array_equal(cut, faces) and not within.any()
     assert np.array_equal(origin, np.arange(len(faces)))
 
@@ -82,7 +82,9 @@ def test_pieces_keep_the_face_that_they_are_of() -> None:
     solid = trimesh.creation.icosphere(subdivisions=2)
     start, faces = np.asarray(solid.vertices), np.asarray(solid.faces)
     everything = np.ones(len(faces), dtype=bool)
-    vertices, cut, origin, within = with_border(start, faces, everything, lambda c: np.hypot(c[:, 0], c[:, 1]) < 0.4)
+    vertices, cut, origin, within = cut_along_border(
+        start, faces, everything, lambda c: np.hypot(c[:, 0], c[:, 1]) < 0.4
+    )
     normals = np.cross(vertices[cut[:, 1]] - vertices[cut[:, 0]], vertices[cut[:, 2]] - vertices[cut[:, 0]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     assert np.einsum("ij,ij->i", normals, solid.face_normals[origin]).min() > 1 - 1e-9

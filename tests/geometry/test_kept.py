@@ -1,7 +1,7 @@
 import trimesh
 
 from manitwin.geometry.cavity import find_opening
-from manitwin.geometry.kept import kept
+from manitwin.geometry.mesh_cache import cached_on_mesh
 
 
 def test_made_once_while_the_mesh_stays_as_it_is() -> None:
@@ -11,17 +11,17 @@ def test_made_once_while_the_mesh_stays_as_it_is() -> None:
         made.append(float(mesh.volume))
         return made[-1]
 
-    assert kept(mesh, "volume", volume) == kept(mesh, "volume", volume) and len(made) == 1
+    assert cached_on_mesh(mesh, "volume", volume) == cached_on_mesh(mesh, "volume", volume) and len(made) == 1
     mesh.apply_scale(2.0)
-    assert kept(mesh, "volume", volume) == 8 * made[0]
+    assert cached_on_mesh(mesh, "volume", volume) == 8 * made[0]
     mesh.vertices[:, 2] *= 3
-    assert kept(mesh, "volume", volume) == 24 * made[0]
+    assert cached_on_mesh(mesh, "volume", volume) == 24 * made[0]
 
 
 def test_copies_have_what_is_their_own() -> None:
     mesh = trimesh.creation.box()
-    assert kept(mesh, "name", lambda: "first") == "first"
-    assert kept(mesh.copy(), "name", lambda: "second") == "second"
+    assert cached_on_mesh(mesh, "name", lambda: "first") == "first"
+    assert cached_on_mesh(mesh.copy(), "name", lambda: "second") == "second"
 
 
 def test_opening_is_found_anew_after_the_mesh_was_closed() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.geometry.seams import close_seams, has_three_places
+from manitwin.geometry.seams import close_seams, has_distinct_corners
 
 
 def unwelded(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
@@ -31,7 +31,7 @@ def test_seams_of_a_solid_are_closed_without_changing_it(make: Any, split: Any) 
     assert mesh.is_watertight and mesh.is_winding_consistent
     assert mesh.volume == pytest.approx(solid.volume, rel=1e-9)
     assert mesh.area == pytest.approx(solid.area, rel=1e-9)
-    kept = has_three_places(mesh.vertices, closed)
+    kept = has_distinct_corners(mesh.vertices, closed)
     assert kept.sum() == len(faces) and kept[: len(faces)].all()
     assert np.array_equal(vertices[source][closed[: len(faces)]], vertices[faces])
 

@@ -20,14 +20,14 @@ from manitwin.physics.grasp_filters import (
     lowest_points_m,
     pad_contacts,
     pad_merits,
-    raised,
+    retract_from_plane,
 )
 from manitwin.physics.grasp_selection import select_likely
 from manitwin.physics.pad_loads import PressedPads
-from manitwin.robots.grippers.gripper import load_gripper, of_kind
+from manitwin.robots.grippers.gripper import load_gripper, require_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 
-PANDA = of_kind(load_gripper("panda"), ParallelGripper)
+PANDA = require_kind(load_gripper("panda"), ParallelGripper)
 FROM_ABOVE = np.diag([1.0, -1.0, -1.0])
 REACH_M = 0.1129  # the far end of the fingers in panda.toml
 DOWN = rotation_between(np.array([0.0, 0, 1]), np.array([0.0, 0, -1]))
@@ -174,7 +174,7 @@ def test_the_plane_may_be_anywhere_in_the_objects_frame() -> None:
 def test_a_low_hand_is_drawn_back_along_its_approach_until_it_is_clear() -> None:
     tilted = rotation_between(np.array([0.0, 0, 1]), np.array([0.0, 0.5, -1]) / np.hypot(0.5, 1))
     poses = np.array([at_tip_height(0.004), at_tip_height(0.004, tilted), at_tip_height(0.05)])
-    back, index = raised(PANDA, poses, np.eye(4))
+    back, index = retract_from_plane(PANDA, poses, np.eye(4))
     assert index.tolist() == [0, 1]
     assert (lowest_points_m(PANDA, back, np.eye(4)) >= SUPPORT_CLEARANCE_M - 1e-9).all()
     moves = back[:, :3, 3] - poses[index, :3, 3]
@@ -186,4 +186,4 @@ def test_a_low_hand_is_drawn_back_along_its_approach_until_it_is_clear() -> None
 def test_what_would_leave_nothing_between_the_pads_or_comes_from_the_side_is_left_out() -> None:
     sideways = rotation_between(np.array([0.0, 0, 1]), np.array([1.0, 0, 0]))
     poses = np.array([at_tip_height(-0.02), at_tip_height(0.004, sideways)])
-    assert len(raised(PANDA, poses, np.eye(4))[1]) == 0
+    assert len(retract_from_plane(PANDA, poses, np.eye(4))[1]) == 0

@@ -16,11 +16,11 @@ from manitwin.physics.pad_loads import PAD_ARM_M, PressedPads, jams, load_share,
 from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.physics.trial import GraspTrial
 from manitwin.physics.trial_recording import RecordingTrial
-from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.gripper import require_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 from rigid_boxes import PANDA, SETTINGS, above, block, box, try_one
 
-JAWS = of_kind(PANDA, ParallelGripper)
+JAWS = require_kind(PANDA, ParallelGripper)
 FRICTION, FORCE_N = 0.75, 50.0  # the mean of 0.5 and the fingertips' 1.0
 LOAD_M_S2 = (9.81, 3.6)  # weight, and the peak of a slide
 

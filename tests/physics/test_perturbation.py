@@ -9,10 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
-from manitwin.physics.robustness import Perturbation, Spread, draw_perturbations
+from manitwin.physics.robustness import Perturbation, PerturbationRanges, draw_perturbations
 from rigid_boxes import PANDA, SETTINGS, above, box
 
-SPREAD = Spread(
+SPREAD = PerturbationRanges(
     pose_m=0.005, pose_deg=5.0, friction=(0.6, 1.4), force=(0.5, 1.0), mass_kg=(0.1, 0.4), center_of_mass_m=0.02
 )
 MANY = 1024
@@ -64,7 +64,7 @@ def test_same_seed_gives_the_same_draws_and_the_first_of_more_are_the_same() -> 
 
 
 def test_known_mass_and_no_spread_change_nothing() -> None:
-    still = Spread(0.0, 0.0, (1.0, 1.0), (1.0, 1.0), (0.3, 0.3), 0.0)
+    still = PerturbationRanges(0.0, 0.0, (1.0, 1.0), (1.0, 1.0), (0.3, 0.3), 0.0)
     body, pose = box([0.04, 0.05, 0.06], 0.3), above([0.01, 0.02, 0.03])
     for draw in draw_perturbations(still, 3, seed=0):
         assert draw.grasp(pose, PANDA.tip_depth_m) == pytest.approx(pose, abs=1e-12)

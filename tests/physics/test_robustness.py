@@ -8,7 +8,13 @@ from itertools import product
 import numpy as np
 import pytest
 
-from manitwin.physics.robustness import Robustness, SequentialTest, Spread, draw_perturbations, try_until_clear
+from manitwin.physics.robustness import (
+    PerturbationRanges,
+    Robustness,
+    SequentialTest,
+    draw_perturbations,
+    run_sequential_test,
+)
 from manitwin.physics.sapien.trial import SapienTrial
 from rigid_boxes import FROM_ABOVE, SETTINGS, above, box, try_one
 
@@ -42,7 +48,7 @@ def test_every_sequence_ends_where_exact_arithmetic_ends_it(
     test = SequentialTest(float(robust), float(fragile), float(error), max_trials)
     for outcomes in product([True, False], repeat=max_trials):
         held, trials, ratio = wald(outcomes, robust, fragile, error)
-        answer = try_until_clear(lambda number, outcomes=outcomes: outcomes[number], test)
+        answer = run_sequential_test(lambda number, outcomes=outcomes: outcomes[number], test)
         assert (answer.held, answer.trials) == (held, trials), outcomes
         if ratio != 1:
             assert test.is_robust(held, trials) == (ratio > 1), outcomes
@@ -51,10 +57,10 @@ def test_every_sequence_ends_where_exact_arithmetic_ends_it(
 def test_default_settles_after_four_successes_or_two_failures() -> None:
     test = SequentialTest(0.9, 0.5, 0.1, 10)
     # (0.9 / 0.5)^4 = 10.5 > 9; (0.1 / 0.5)^2 = 1 / 25 < 1 / 9
-    assert try_until_clear(lambda number: True, test) == Robustness(4, 4)
-    assert try_until_clear(lambda number: False, test) == Robustness(0, 2)
+    assert run_sequential_test(lambda number: True, test) == Robustness(4, 4)
+    assert run_sequential_test(lambda number: False, test) == Robustness(0, 2)
     # a failure among them costs three more successes and a bit: 1.8^7 / 5 = 12.2
-    assert try_until_clear(lambda number: number != 2, test) == Robustness(7, 8)
+    assert run_sequential_test(lambda number: number != 2, test) == Robustness(7, 8)
     assert test.is_robust(7, 8)
 
 
@@ -65,7 +71,7 @@ def test_trials_are_asked_for_in_order_and_never_beyond_the_limit() -> None:
         asked.append(number)
         return number % 4 != 1
 
-    try_until_clear(holds, SequentialTest(0.9, 0.5, 0.001, 6))
+    run_sequential_test(holds, SequentialTest(0.9, 0.5, 0.001, 6))
     assert asked == [0, 1, 2, 3, 4, 5]
 
 
@@ -81,7 +87,7 @@ def rate_of_robust(share: float, test: SequentialTest) -> tuple[float, float]:
         trials += sum(open_.values())
         open_ = {}
         for held, chance in then.items():
-            if not test.is_clear(held, number):
+            if not test.is_decided(held, number):
                 open_[held] = chance
             elif test.is_robust(held, number):
                 robust += chance
@@ -101,7 +107,7 @@ def test_exact_rates_are_those_of_many_simulated_grasps() -> None:
     test = SequentialTest(0.9, 0.5, 0.1, 10)
     rng = np.random.default_rng(0)
     for share in (0.5, 0.75, 0.95):
-        answers = [try_until_clear(lambda number, p=share: bool(rng.random() < p), test) for _ in range(4000)]
+        answers = [run_sequential_test(lambda number, p=share: bool(rng.random() < p), test) for _ in range(4000)]
         robust = np.mean([test.is_robust(answer.held, answer.trials) for answer in answers])
         expected, trials = rate_of_robust(share, test)
         assert robust == pytest.approx(expected, abs=4 * 0.5 / np.sqrt(4000))
@@ -122,7 +128,7 @@ def test_box_gripped_at_its_center_of_mass_is_more_robust_than_one_gripped_at_it
     middle, end = above([0, 0, 0], FROM_ABOVE), above([0, 0.08, 0], FROM_ABOVE)
     engine = SapienTrial()
     assert {try_one(engine, body, pose).outcome for pose in (middle, end)} == {"held"}
-    spread = Spread(0.005, 5.0, (0.6, 1.4), (0.5, 1.0), (0.4, 0.9), 0.005)
+    spread = PerturbationRanges(0.005, 5.0, (0.6, 1.4), (0.5, 1.0), (0.4, 0.9), 0.005)
     variants = [(draw, draw.body(body), draw.settings(SETTINGS)) for draw in draw_perturbations(spread, 10, seed=0)]
 
     def survives(pose: np.ndarray, number: int) -> bool:
@@ -130,6 +136,6 @@ def test_box_gripped_at_its_center_of_mass_is_more_robust_than_one_gripped_at_it
         return try_one(engine, other, draw.grasp(pose, 0.1034), settings).outcome == "held"
 
     test = SequentialTest(0.9, 0.5, 0.1, 10)
-    near, far = (try_until_clear(lambda n, pose=pose: survives(pose, n), test) for pose in (middle, end))
+    near, far = (run_sequential_test(lambda n, pose=pose: survives(pose, n), test) for pose in (middle, end))
     assert near.rank_value > far.rank_value + 0.2
     assert test.is_robust(near.held, near.trials) and not test.is_robust(far.held, far.trials)

@@ -15,7 +15,7 @@ from manitwin.physics.trial import TrialSettings
 from manitwin.robots.definition import definition_path, read_definition
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
-from manitwin.robots.links import links_of_urdf
+from manitwin.robots.links import read_urdf_links
 from manitwin.robots.load import load_robot, shipped_robots
 from manitwin.robots.robot import Robot
 
@@ -54,7 +54,7 @@ class Held:
 
     def close(self, seconds: float = 0.8) -> None:
         for _ in range(round(seconds / (4 * DT))):
-            self.robot.set_opening_target(2 * self.target.move_on(self.robot.opening_m() / 2))
+            self.robot.set_opening_target(2 * self.target.advance_target(self.robot.opening_m() / 2))
             for _ in range(4):
                 self.system.step()
 
@@ -178,6 +178,6 @@ def test_state_beyond_the_limits_is_clipped():
 def test_a_second_robot_reads_no_file():
     robot = load_robot("panda")
     SapienRobot(sapien.Scene([physx.PhysxCpuSystem()]), robot)
-    misses = links_of_urdf.cache_info().misses
+    misses = read_urdf_links.cache_info().misses
     SapienRobot(sapien.Scene([physx.PhysxCpuSystem()]), robot)
-    assert links_of_urdf.cache_info().misses == misses
+    assert read_urdf_links.cache_info().misses == misses

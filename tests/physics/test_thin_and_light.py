@@ -11,7 +11,7 @@ from manitwin.physics.mujoco.body import STIFF_SOLREF
 from manitwin.physics.mujoco.hand_scene import FINGER_MASS_KG, SINK_M, even_impedance
 from manitwin.physics.mujoco.trial import MujocoTrial
 from manitwin.physics.robustness import jittered
-from manitwin.physics.sapien.trial import SapienTrial, finer_for_what_is_light
+from manitwin.physics.sapien.trial import SapienTrial, with_timestep_for_mass
 from rigid_boxes import PANDA, SETTINGS, SLIDE_PEAK_M_S2, above, annulus, as_a_whole, box, try_one
 
 SHEETS_M = [[0.005, 0.04, 0.04], [0.001, 0.04, 0.04], [0.0005, 0.04, 0.04]]
@@ -25,14 +25,14 @@ def test_sheet_that_sapiens_fingers_tunnel_into_never_counts(extents_m: list[flo
 
 
 def test_step_is_as_small_as_the_closing_force_wants_of_what_is_light() -> None:
-    steps = {mass_kg: finer_for_what_is_light(SETTINGS, mass_kg) for mass_kg in (1.0, 0.06, 0.04, 0.02, 0.001)}
+    steps = {mass_kg: with_timestep_for_mass(SETTINGS, mass_kg) for mass_kg in (1.0, 0.06, 0.04, 0.02, 0.001)}
     assert [round(1 / each.timestep_s) for each in steps.values()] == [240, 240, 480, 960, 960]
     for each in steps.values():  # the same protocol: its frames, and the time that it has
         assert each.frame_s == pytest.approx(SETTINGS.frame_s)
         assert each.max_steps * each.timestep_s == pytest.approx(SETTINGS.max_steps * SETTINGS.timestep_s)
     finer = replace(SETTINGS, timestep_s=1 / 1920)
-    assert finer_for_what_is_light(finer, 0.001) == finer, "what is asked for is not made coarser"
-    assert finer_for_what_is_light(replace(SETTINGS, force_n=10.0), 0.02) == replace(SETTINGS, force_n=10.0)
+    assert with_timestep_for_mass(finer, 0.001) == finer, "what is asked for is not made coarser"
+    assert with_timestep_for_mass(replace(SETTINGS, force_n=10.0), 0.02) == replace(SETTINGS, force_n=10.0)
 
 
 @pytest.mark.parametrize("extents_m", [[0.008, 0.14, 0.008], [0.004, 0.14, 0.012]])

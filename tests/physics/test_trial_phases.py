@@ -237,7 +237,7 @@ def test_target_runs_at_the_closing_speed_and_presses_with_the_force() -> None:
     target = SharedTarget(0.08, SETTINGS)
     position, ahead = 0.04, []
     for _ in range(60):
-        goal = target.move_on(position)
+        goal = target.advance_target(position)
         ahead.append(position - goal)
         position = max(0.02, goal)  # a box of 40 mm
     assert ahead[0] == pytest.approx(0.1 / 60)
@@ -249,7 +249,7 @@ def test_target_tells_that_it_presses_only_with_the_whole_force() -> None:
     target = SharedTarget(0.08, SETTINGS)
     position, pressed = 0.04, []
     for _ in range(60):
-        goal = target.move_on(position)
+        goal = target.advance_target(position)
         pressed.append((target.presses, position - goal))
         position = max(0.02, goal)
     full_m = SETTINGS.force_n / SETTINGS.finger_stiffness_n_m
@@ -259,9 +259,9 @@ def test_target_tells_that_it_presses_only_with_the_whole_force() -> None:
 
 def test_pads_that_meet_open_again_for_good() -> None:
     target = SharedTarget(0.08, SETTINGS)
-    assert target.move_on(0.001) < 0.04
-    assert target.move_on(0.0) == 0.04
-    assert target.move_on(0.03) == 0.04
+    assert target.advance_target(0.001) < 0.04
+    assert target.advance_target(0.0) == 0.04
+    assert target.advance_target(0.03) == 0.04
 
 
 @pytest.mark.parametrize("engine", [SapienTrial(), MujocoTrial()], ids=lambda engine: engine.name)

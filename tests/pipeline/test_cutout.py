@@ -18,8 +18,8 @@ from manitwin.cli.main import app
 from manitwin.config import BuildConfig, MattingConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
-from manitwin.models.matting.matte import DoubtedCutOut, Matte
-from manitwin.pipeline.cutout import CUTOUT, SHOWN_PX, confirmation, confirmed_or_rejected, shown_cutout
+from manitwin.models.matting.matte import DoubtfulMatte, Matte
+from manitwin.pipeline.cutout import CUTOUT, SHOWN_PX, confirmation, confirmed_or_rejected, encode_preview
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotoStage
 from manitwin.twin.dataset_root import DatasetRoot
@@ -38,17 +38,17 @@ def half() -> np.ndarray:
 
 
 def test_picture_of_a_cut_out_is_small_and_keeps_what_would_be_cut_away() -> None:
-    picture = shown_cutout(half())
+    picture = encode_preview(half())
     shown = np.asarray(Image.open(io.BytesIO(picture)))
-    assert shown.shape == (SHOWN_PX // 2, SHOWN_PX, 4) and picture == shown_cutout(half())
+    assert shown.shape == (SHOWN_PX // 2, SHOWN_PX, 4) and picture == encode_preview(half())
     assert (shown[:, : SHOWN_PX // 2, 3] == 255).all() and (shown[:, SHOWN_PX // 2 :, 3] == 0).all()
     assert shown[:, SHOWN_PX // 2 :, :3].mean() == pytest.approx(127.5, abs=3)
 
 
 def test_only_the_picture_that_was_looked_at_is_confirmed() -> None:
-    doubted = DoubtedCutOut("low_confidence_matte", "a.jpg: why", Matte(half(), "network", 0.4, ("cut",), {}))
+    doubted = DoubtfulMatte("low_confidence_matte", "a.jpg: why", Matte(half(), "network", 0.4, ("cut",), {}))
     doubted = pickle.loads(pickle.dumps(doubted))
-    sha256 = hashlib.sha256(shown_cutout(half())).hexdigest()
+    sha256 = hashlib.sha256(encode_preview(half())).hexdigest()
     matte = confirmed_or_rejected(doubted, "a.jpg", {"cutout": {"sha256": sha256, "source": "human:ada"}})
     assert matte.confidence == 0.4
     assert matte.findings == ("doubtful by itself (0.40); human:ada confirmed the cut-out", "cut")
@@ -59,15 +59,15 @@ def test_only_the_picture_that_was_looked_at_is_confirmed() -> None:
     assert (caught.value.reason, set(caught.value.files)) == ("low_confidence_matte", {CUTOUT})
     with pytest.raises(Rejected, match=r"^low_confidence_matte: a\.jpg: why$") as caught:
         confirmed_or_rejected(doubted, "a.jpg", {})
-    assert pickle.loads(pickle.dumps(caught.value)).files == {CUTOUT: shown_cutout(half())}
+    assert pickle.loads(pickle.dumps(caught.value)).files == {CUTOUT: encode_preview(half())}
 
 
 def test_what_would_be_cut_out_otherwise_now_is_cut_out_as_it_was_confirmed() -> None:
-    said = {"cutout": confirmation(shown_cutout(half()), "human:ada")}
-    assert said["cutout"]["sha256"] == hashlib.sha256(shown_cutout(half())).hexdigest()
+    said = {"cutout": confirmation(encode_preview(half()), "human:ada")}
+    assert said["cutout"]["sha256"] == hashlib.sha256(encode_preview(half())).hexdigest()
     otherwise = half()
     otherwise[..., 3] = np.roll(otherwise[..., 3], 300, axis=1)
-    doubted = DoubtedCutOut("low_confidence_matte", "a.jpg: why", Matte(otherwise, "network", 0.4, ("cut",), {}))
+    doubted = DoubtfulMatte("low_confidence_matte", "a.jpg: why", Matte(otherwise, "network", 0.4, ("cut",), {}))
     matte = confirmed_or_rejected(doubted, "a.jpg", said)
     assert matte.findings == ("cut out as human:ada confirmed it",) and matte.confidence == 0.4
     assert (matte.rgba[..., :3] == otherwise[..., :3]).all() and matte.rgba.flags.c_contiguous
@@ -77,11 +77,11 @@ def test_what_would_be_cut_out_otherwise_now_is_cut_out_as_it_was_confirmed() ->
 
 @pytest.mark.parametrize("damage", ["nonsense", "", "bm8gcGljdHVyZQ=="])
 def test_what_was_confirmed_of_another_part_of_the_photo_or_cannot_be_read_is_looked_at_again(damage: str) -> None:
-    said = confirmation(shown_cutout(half()), "human:ada")
-    part = DoubtedCutOut("low_confidence_matte", "a.jpg: why", Matte(half()[:900], "network", 0.4, (), {}))
+    said = confirmation(encode_preview(half()), "human:ada")
+    part = DoubtfulMatte("low_confidence_matte", "a.jpg: why", Matte(half()[:900], "network", 0.4, (), {}))
     whole = half()
     whole[:700, :, 3] = 255
-    otherwise = DoubtedCutOut("low_confidence_matte", "a.jpg: why", Matte(whole, "network", 0.4, (), {}))
+    otherwise = DoubtfulMatte("low_confidence_matte", "a.jpg: why", Matte(whole, "network", 0.4, (), {}))
     for doubted, kept in ((part, said), (otherwise, {**said, "alpha_png": damage})):
         with pytest.raises(Rejected, match="differs from the one that human:ada confirmed; check it again"):
             confirmed_or_rejected(doubted, "a.jpg", {"cutout": kept})

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from manitwin.pipeline.drawn_border import BORDERED, without_border
-from manitwin.pipeline.given_alpha import as_given
+from manitwin.pipeline.given_alpha import interpret_alpha
 
 HEIGHT, WIDTH = 240, 320
 
@@ -83,8 +83,8 @@ def test_a_sheet_whose_edge_runs_along_one_side_is_no_border() -> None:
 
 
 def test_what_is_looked_at_says_that_its_border_was_cut_off() -> None:
-    given = as_given(bordered(scene(), (3, 3, 3, 3), 20), "mug")
+    given = interpret_alpha(bordered(scene(), (3, 3, 3, 3), 20), "mug")
     assert given.findings == (BORDERED,) and not given.is_doubted
     opaque = np.dstack([bordered(scene(), (3, 3, 3, 3), 20), np.full((HEIGHT + 6, WIDTH + 6), 255, np.uint8)])
-    assert as_given(opaque, "mug").pixels.shape == given.pixels.shape, "an opaque alpha channel says nothing"
-    assert as_given(scene(), "mug").findings == ()
+    assert interpret_alpha(opaque, "mug").pixels.shape == given.pixels.shape, "an opaque alpha channel says nothing"
+    assert interpret_alpha(scene(), "mug").findings == ()

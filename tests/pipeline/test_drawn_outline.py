@@ -19,13 +19,13 @@ from manitwin.pipeline.drawn_outline import (
     DRAWN,
     DRAWN_OF_SEVERAL,
     DrawnOutline,
-    as_drawn,
+    cut_by_outline,
     drawn_outline,
     mask_file,
     mask_of_png,
     with_outline,
 )
-from manitwin.pipeline.given_alpha import Given
+from manitwin.pipeline.given_alpha import CutOutInput
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotosStage, PhotoStage
 
@@ -75,8 +75,8 @@ def test_png_of_another_kind_is_none() -> None:
 
 def test_outline_is_scaled_to_its_picture_and_goes_before_the_pictures_own_alpha() -> None:
     pixels = np.full((400, 600, 4), 90, np.uint8)
-    given = as_drawn(
-        Given(pixels, ("another",), is_doubted=True), DrawnOutline(ellipse(200, 300), "human:ada"), "a.png"
+    given = cut_by_outline(
+        CutOutInput(pixels, ("another",), is_doubted=True), DrawnOutline(ellipse(200, 300), "human:ada"), "a.png"
     )
     assert given.pixels.shape == (400, 600, 4) and not given.is_doubted
     assert ((given.pixels[..., 3] > 127) == ellipse(400, 600)).mean() > 0.99
@@ -84,14 +84,14 @@ def test_outline_is_scaled_to_its_picture_and_goes_before_the_pictures_own_alpha
 
 
 def test_outline_of_other_proportions_an_empty_one_and_a_full_one_are_refused() -> None:
-    given = Given(np.zeros((400, 600, 3), np.uint8))
+    given = CutOutInput(np.zeros((400, 600, 3), np.uint8))
     for mask, why in (
         (ellipse(300, 300), "drew the outline on another picture"),
         (np.zeros((200, 300), bool), "is empty"),
         (np.ones((200, 300), bool), "covers the whole photo"),
     ):
         with pytest.raises(Rejected, match=why):
-            as_drawn(given, DrawnOutline(mask, "human:ada"), "a.png")
+            cut_by_outline(given, DrawnOutline(mask, "human:ada"), "a.png")
 
 
 def test_outline_as_a_mask_of_the_whole_photo_lies_where_it_was_drawn() -> None:

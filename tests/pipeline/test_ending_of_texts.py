@@ -9,7 +9,7 @@ import pytest
 
 from manitwin.pipeline.recipe import ending_of
 from manitwin.twin.dataset_root import twin_name
-from manitwin.twin.store import RECORD, read_record, seal
+from manitwin.twin.store import RECORD, read_record, write_twin_record
 from twin_folders import write_accepted
 
 
@@ -31,7 +31,7 @@ def test_text_that_does_not_name_its_template_is_told_what_it_was_taken_as(
     stages = record["provenance"]["stages"]
     stages["generate"] = {**next(iter(stages.values())), "backend": "lift", "model": model}
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
     assert ending_of(read_record(folder)).detail.endswith(end)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from manitwin.config import BuildConfig
-from manitwin.pipeline.generator_input import refusal
+from manitwin.pipeline.generator_input import make_input_check
 from manitwin.pipeline.item import Item
 
 
@@ -22,7 +22,7 @@ from manitwin.pipeline.item import Item
     ],
 )
 def test_a_text_is_not_built_under_the_name_of_another_thing(text: str, name: str | None, refused: bool) -> None:
-    why = refusal(BuildConfig())(Item(file=None, text=text, name=name))
+    why = make_input_check(BuildConfig())(Item(file=None, text=text, name=name))
     assert (why is not None) == refused
     if why is not None:
         assert repr(name) in why and "leave out the name" in why

@@ -13,7 +13,7 @@ from manitwin.config import MattingConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.pipeline.cutout import CUTOUT
-from manitwin.pipeline.given_alpha import FRAMED, framed_picture, usable
+from manitwin.pipeline.given_alpha import FRAMED, framed_picture, normalize_alpha
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotoStage
 
@@ -83,7 +83,7 @@ def test_an_empty_channel_stays_empty(tmp_path: Path) -> None:
     for most in (0, 9):
         pixels = with_alpha(photo_of_a_block(), 0)
         pixels[100, 100, 3] = most
-        assert usable(pixels)[0] is pixels
+        assert normalize_alpha(pixels)[0] is pixels
         with pytest.raises(Rejected, match="alpha channel is empty"):
             cut_out(pixels, tmp_path)
 

@@ -11,8 +11,8 @@ import trimesh
 from manitwin.geometry.poses import transform
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.object_sampling import make_object
 from manitwin.pipeline.grasp_regions import PartedSolid, region_columns
 
 DEPTH_M, OPENING_M = 0.1, 0.08
@@ -21,7 +21,7 @@ DOWN, SIDE = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
 
 def solid_of(category: str) -> tuple[PartedSolid, tuple[str, ...]]:
     templates = load_templates()
-    made = make(templates[category], read_text(category, templates), np.random.default_rng(0))
+    made = make_object(templates[category], read_text(category, templates), np.random.default_rng(0))
     solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
     ids = tuple(f"p{place}" for place in range(len(made.mesh.names)))
     return PartedSolid(solid, RayCaster(solid), made.mesh.part.astype(np.uint8), ids, 0.03, OPENING_M), made.mesh.names

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import manitwin
 from manitwin.cli.main import app
 from manitwin.config import BuildConfig
-from manitwin.dataset.review.corrections import settled
+from manitwin.dataset.review.corrections import resolve_corrections
 from manitwin.dataset.review.store import ReviewStore, Stored
 from manitwin.dataset.review.verdicts import Review
 from manitwin.engine.amendments import amendments_name, read_amendments, write_amendments
@@ -62,7 +62,7 @@ def mass(value: float) -> dict[str, float]:
 
 
 def test_what_nobody_contradicts_is_applied_with_the_names_of_all_who_said_it() -> None:
-    agreed, conflicts = settled(
+    agreed, conflicts = resolve_corrections(
         [said("ada", category="Coffee Mug"), said("ben", category="coffee mug"), said("eva", "unsure")]
     )
     assert [(each.name, each.source) for each in agreed] == [("category", "human:ada+ben")] and not conflicts
@@ -70,14 +70,14 @@ def test_what_nobody_contradicts_is_applied_with_the_names_of_all_who_said_it() 
 
 @pytest.mark.parametrize("other", [said("ben", category="bowl"), said("ben", "yes")])
 def test_contradictions_are_listed_and_not_applied(other: Stored) -> None:
-    agreed, conflicts = settled([said("ada", category="mug"), other])
+    agreed, conflicts = resolve_corrections([said("ada", category="mug"), other])
     assert not agreed
     assert conflicts[0].said == {"ada": "mug", "ben": "bowl" if other.review.corrections.category else "yes"}
 
 
 def test_one_value_may_be_settled_where_another_is_disputed() -> None:
     of_ada = said("ada", dimension="physical", mass_kg=mass(0.2), longest_side_m=mass(0.1))
-    agreed, conflicts = settled([of_ada, said("ben", dimension="physical", mass_kg=mass(0.3))])
+    agreed, conflicts = resolve_corrections([of_ada, said("ben", dimension="physical", mass_kg=mass(0.3))])
     assert ([each.name for each in agreed], [each.name for each in conflicts]) == (["longest_side_m"], ["mass_kg"])
 
 

@@ -9,13 +9,13 @@ from PIL import Image
 
 from manitwin.pipeline.folder_listing import list_folder
 from manitwin.pipeline.manifest import Notes, iterate_items
-from manitwin.pipeline.masks_beside import masks_beside
+from manitwin.pipeline.mask_matching import match_masks
 
 
 @pytest.mark.parametrize("mask", ["mug_mask.png", "mug-mask.jpg", "mug.mask.png", "mug_MASK.webp"])
 def test_a_name_tells_a_mask(mask: str) -> None:
-    assert masks_beside(["mug.jpg", mask]) == {mask: "mug.jpg"}
-    assert masks_beside(["a/mug.jpg", f"a/{mask}"]) == {f"a/{mask}": "a/mug.jpg"}
+    assert match_masks(["mug.jpg", mask]) == {mask: "mug.jpg"}
+    assert match_masks(["a/mug.jpg", f"a/{mask}"]) == {f"a/{mask}": "a/mug.jpg"}
 
 
 @pytest.mark.parametrize(
@@ -31,12 +31,12 @@ def test_a_name_tells_a_mask(mask: str) -> None:
     ],
 )
 def test_other_names_tell_none(names: list[str]) -> None:
-    assert masks_beside(names) == {}
+    assert match_masks(names) == {}
 
 
 def test_a_mask_has_none_itself() -> None:
     names = ["mug.jpg", "mug_mask.jpg", "mug_mask_mask.jpg"]
-    assert masks_beside(names) == {"mug_mask.jpg": "mug.jpg"}
+    assert match_masks(names) == {"mug_mask.jpg": "mug.jpg"}
 
 
 def _folder(place: Path, *names: str) -> Path:

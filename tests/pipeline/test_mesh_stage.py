@@ -14,13 +14,13 @@ from manitwin.config import MeshConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected
 from manitwin.formats.glb import read_glb, write_glb
+from manitwin.formats.meshes.shading_normals import with_creased_normals
 from manitwin.formats.meshes.textures import make_part
-from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.cavity import find_opening
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.known import known_of
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import Wanted
+from manitwin.models.generators.templates.description_parser import ObjectDescription
+from manitwin.models.generators.templates.ground_truth import object_import_record
+from manitwin.models.generators.templates.object_sampling import make_object
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.mesh import MeshStage
 from manitwin.twin.import_record import FITTED, GivenPoint
@@ -92,8 +92,8 @@ def test_a_game_asset_whose_numbers_are_no_lengths_has_no_scale(tmp_path: Path) 
 def test_a_stated_longest_side_is_the_size_of_what_has_none(tmp_path: Path) -> None:
     """A generator's mesh in a unit of its own, and with it what the generator knows of it."""
     trimesh.creation.box((2.0, 1.2, 0.8)).export(tmp_path / "generated.glb")
-    made = make(load_templates()["book"], Wanted("book", {}), np.random.default_rng(0))
-    known = known_of(made, "book").model_copy(
+    made = make_object(load_templates()["book"], ObjectDescription("book", {}), np.random.default_rng(0))
+    known = object_import_record(made, "book").model_copy(
         update={"functional_points": [GivenPoint(position_m=(1.0, 0.0, 0.8))], "format": FITTED}
     )
     fields = {"generation": {"rests": True, "metric": False, "known": known.model_dump(mode="json")}}

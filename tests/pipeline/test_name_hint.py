@@ -11,7 +11,7 @@ import pytest
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.pipeline.assembly import NAME_HINT, _rejection, name_would_help
-from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID, unsaid_size_words
+from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID, typical_size_words
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.recipe import ending_of
 from manitwin.pipeline.size_remarks import CHECK_SCALE
@@ -130,13 +130,13 @@ def test_a_name_that_the_priors_do_not_know_is_said_in_the_result_line(tmp_path:
 def test_a_size_from_a_prior_is_told_as_nobodys_statement(source: str, of: str) -> None:
     size = {"value": 0.15, "low": 0.02, "high": 0.6, "source": source}
     draft = Draft(item_id="0" * 16, payload=Item(file=None, text="x"), seed=0, fields={"size": size})
-    assert unsaid_size_words(draft) == f"{SIZE_UNSAID}: 15 cm is what is {of} (2 to 60 cm)"
+    assert typical_size_words(draft) == f"{SIZE_UNSAID}: 15 cm is what is {of} (2 to 60 cm)"
 
 
 @pytest.mark.parametrize("said", [None, {"value": 0.15, "low": 0.15, "high": 0.15, "source": "vlm:qwen"}])
 def test_a_size_that_a_mesh_or_a_model_says_is_no_guess(said: dict[str, Any] | None) -> None:
     draft = Draft(item_id="0" * 16, payload=Item(file=None, text="x"), seed=0, fields={"size": said})
-    assert unsaid_size_words(draft) is None
+    assert typical_size_words(draft) is None
 
 
 @pytest.mark.parametrize(

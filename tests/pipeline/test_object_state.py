@@ -12,7 +12,7 @@ from PIL import Image
 from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.pipeline import object_state
-from manitwin.pipeline.object_state import KEPT, let_go_of_textures, load_solid, load_visual
+from manitwin.pipeline.object_state import KEPT, drop_cached_textures, load_solid, load_visual
 from manitwin.render.surfaces import plain_part
 
 
@@ -79,5 +79,5 @@ def test_textures_are_let_go_before_the_next_thing_is_read_and_what_is_plain_sta
     for path, part in zip(paths, parts, strict=True):
         path.write_bytes(write_glb([part]))
     textured, plain = (load_visual(path)[0] for path in paths)
-    let_go_of_textures()
+    drop_cached_textures()
     assert load_visual(paths[1])[0] is plain and load_visual(paths[0])[0] is not textured

@@ -14,13 +14,13 @@ from manitwin.formats.glb import read_glb, write_glb
 from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.parts.shape import measure_shape
 from manitwin.models.annotators.part_names import part_name
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.known import known_of
-from manitwin.models.generators.templates.made import visual_parts
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.ground_truth import object_import_record
+from manitwin.models.generators.templates.object_sampling import make_object
+from manitwin.models.generators.templates.template_object import visual_parts
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.parts import PARTS_FILE, PartsStage
 
@@ -43,9 +43,9 @@ def draft_of(folder: Path, mesh: trimesh.Trimesh, parts: list[trimesh.Trimesh], 
 @pytest.mark.parametrize("category", ["hammer", "teapot", "book"])
 def test_parts_of_a_template_are_those_it_was_built_of(tmp_path: Path, category: str) -> None:
     templates = load_templates()
-    made = make(templates[category], read_text(category, templates), np.random.default_rng(0))
+    made = make_object(templates[category], read_text(category, templates), np.random.default_rng(0))
     solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
-    known = known_of(made, category).model_dump(mode="json")
+    known = object_import_record(made, category).model_dump(mode="json")
     draft = draft_of(tmp_path, solid, visual_parts(made), category, known)
     table = PartsStage().run(draft, tmp_path)["parts"]
     with np.load(tmp_path / PARTS_FILE) as arrays:
@@ -102,7 +102,7 @@ def test_part_is_called_what_a_point_on_it_is_called(tmp_path: Path) -> None:
     ],
 )
 def test_name_is_that_of_the_whole_part(role: str, category: str, labels: list[str], name: str) -> None:
-    prior = lookup(category)
+    prior = find_prior(category)
     assert prior is not None and part_name(role, prior, labels) == name
 
 
@@ -116,7 +116,7 @@ def test_name_is_that_of_the_whole_part(role: str, category: str, labels: list[s
     ],
 )
 def test_sections_are_called_by_the_places_that_they_hold(category: str, names: dict[str, str]) -> None:
-    prior = lookup(category)
+    prior = find_prior(category)
     assert prior is not None and prior.parts == "sectioned"
     assert {role: part_name(role, prior, [], names) for role in names} == names
 
@@ -146,7 +146,9 @@ def test_nothing_is_told_of_what_has_no_rule(tmp_path: Path, name: str) -> None:
 def test_faces_that_repair_has_changed_are_not_given_a_templates_parts(tmp_path: Path) -> None:
     mesh = mug()
     templates = load_templates()
-    known = known_of(make(templates["mug"], read_text("mug", templates), np.random.default_rng(0)), "mug")
+    known = object_import_record(
+        make_object(templates["mug"], read_text("mug", templates), np.random.default_rng(0)), "mug"
+    )
     shown = [visual(mesh, baseColorFactor=[200, 10, 10, 255])]
     draft = draft_of(tmp_path, mesh, shown, "mug", known.model_dump(mode="json"))
     assert {part["source"] for part in PartsStage().run(draft, tmp_path)["parts"]} == {"geometry:handled"}
@@ -156,7 +158,7 @@ def test_faces_that_repair_has_changed_are_not_given_a_templates_parts(tmp_path:
 def test_a_keys_bow_begins_where_it_widens(seed: int) -> None:
     """A round bow widens by degrees: no sharp step shows it, and a notch of the blade is one."""
     templates, prior = load_templates(), load_priors()["key"]
-    made = make(templates["key"], read_text("key", templates), np.random.default_rng(seed))
+    made = make_object(templates["key"], read_text("key", templates), np.random.default_rng(seed))
     solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
     shape = measure_shape(solid, solid.center_mass, prior.head_end, False, np.random.default_rng(seed))
     assert prior.parts is not None

@@ -22,7 +22,7 @@ from manitwin.pipeline.generate import GenerateStage, read_views
 from manitwin.pipeline.item import Item, twin_id
 from manitwin.pipeline.manifest import Notes, iterate_items
 from manitwin.pipeline.photo import PhotosStage
-from manitwin.pipeline.photo_groups import told_apart
+from manitwin.pipeline.photo_groups import distinct_names
 from manitwin.pipeline.quality import photos_checks
 from manitwin.pipeline.recipe import TwinRecipe
 
@@ -159,7 +159,7 @@ def test_a_photo_that_cannot_be_cut_out_is_left_out_and_told(photos: Path, tmp_p
 
 def test_photos_of_one_name_are_told_apart_by_their_folders() -> None:
     files = ["/a/left/0.png", "/a/right/0.png", "/b/right/0.png", "/a/1.png"]
-    assert told_apart(files) == ["left/0.png", "a/right/0.png", "b/right/0.png", "1.png"]
+    assert distinct_names(files) == ["left/0.png", "a/right/0.png", "b/right/0.png", "1.png"]
 
 
 def test_a_copy_of_a_photo_is_told(photos: Path, tmp_path: Path) -> None:

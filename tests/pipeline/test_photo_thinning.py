@@ -14,8 +14,8 @@ from manitwin.errors import Rejected, UsageError
 from manitwin.pipeline.carved_photos import carve_photos
 from manitwin.pipeline.item import Item, twin_id
 from manitwin.pipeline.manifest import Notes, iterate_items
-from manitwin.pipeline.photo_groups import one_of_photos
-from manitwin.pipeline.photo_thinning import MOST_GIVEN, kept_photos
+from manitwin.pipeline.photo_groups import group_photos
+from manitwin.pipeline.photo_thinning import MOST_GIVEN, select_photos
 from manitwin.pipeline.quality import photos_checks
 from posed_things import pose_at, transforms_document
 
@@ -62,7 +62,7 @@ def test_photos_with_poses_are_thinned_out_by_where_their_cameras_look(tmp_path:
     kept = [int(Path(file).stem) for file in item.files]
     assert len(kept) == 72 and item.photos_given == 90 and kept == sorted(kept) and kept[0] == 0
     assert len([number for number in kept if number < 60]) >= 55  # the crowd on one side is what is thinned
-    assert kept == kept_photos(photos, [], tmp_path / "transforms.json")
+    assert kept == select_photos(photos, [], tmp_path / "transforms.json")
 
 
 def test_too_many_photos_are_refused_where_nobody_says_where_the_camera_was(tmp_path: Path) -> None:
@@ -71,7 +71,7 @@ def test_too_many_photos_are_refused_where_nobody_says_where_the_camera_was(tmp_
         list(iterate_items(photos, {}, Notes(), views=True))
     items = [Item(f"/nowhere/{number}.png") for number in range(MOST_GIVEN + 1)]
     with pytest.raises(UsageError, match="give at most 4096"):
-        one_of_photos(items, list(np.linspace(0, 359, len(items))), "--views")
+        group_photos(items, list(np.linspace(0, 359, len(items))), "--views")
 
 
 def test_a_photo_without_a_pose_is_named_among_many(tmp_path: Path) -> None:

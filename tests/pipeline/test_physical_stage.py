@@ -19,8 +19,8 @@ from manitwin.errors import BadReply, Rejected
 from manitwin.formats.glb import read_glb, write_glb
 from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.geometry.poses import GLTF_TO_OBJECT
-from manitwin.models.annotators.given import KeepsGiven
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.imported_annotations import ImportedAnnotator
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.pipeline.annotated_mass import annotated_mass
@@ -92,13 +92,13 @@ def test_a_metric_mesh_keeps_its_size_and_its_file(tmp_path: Path) -> None:
 def test_a_mesh_of_no_known_scale_gets_the_longest_axis_of_such_a_thing(tmp_path: Path) -> None:
     giant = cylinder(1.0, 3.0)
     physical = run(giant, tmp_path, "soda can", metric=False)
-    longest = lookup("soda can").longest_axis_m.typical
+    longest = find_prior("soda can").longest_axis_m.typical
     assert physical.scale_applied == pytest.approx(longest / 3.0, rel=1e-6)
     assert max(physical.obb.extents_m) == pytest.approx(longest)
     assert np.array(physical.obb.obb_to_object)[:3, 3] == pytest.approx([0, 0, longest / 2], abs=1e-9)
     assert load_solid(tmp_path / "solid.npz").extents == pytest.approx(np.array([2, 2, 3]) * longest / 3)
     assert read_glb(tmp_path / "visual.glb")[0].extents == pytest.approx(np.array([2, 2, 3]) * longest / 3, rel=1e-5)
-    assert lookup("soda can").mass_kg.low <= physical.mass_kg.value <= lookup("soda can").mass_kg.high
+    assert find_prior("soda can").mass_kg.low <= physical.mass_kg.value <= find_prior("soda can").mass_kg.high
 
 
 def test_a_hollow_ball_is_a_shell(tmp_path: Path) -> None:
@@ -199,7 +199,7 @@ def test_a_bottle_says_what_it_weighs_empty_half_full_and_full(tmp_path: Path) -
     assert physical.filling is not None and "full water bottle" in physical.filling.assumption
     empty, half, full = physical.filling.states
     assert [each.share for each in physical.filling.states] == [0.0, 0.5, 1.0]
-    prior = lookup("water bottle")
+    prior = find_prior("water bottle")
     assert prior is not None and prior.bulk_density_kg_m3 is not None
     volume = physical.mass_kg.value / physical.density_kg_m3
     assert empty.mass_kg == pytest.approx(max(prior.bulk_density_kg_m3.low * volume, prior.mass_kg.low))
@@ -224,7 +224,7 @@ def test_true_center_of_a_bottle_with_an_uneven_wall_is_within_its_states_uncert
     """The truth is the closed form of a tube with two ends of unlike thickness, and water to a level."""
     physical = run(bottle(), tmp_path, "water bottle")
     assert physical.filling is not None
-    state = physical.filling.at(share)
+    state = physical.filling.state_at(share)
     assert state is not None and state.center_of_mass_uncertainty_m is not None
     radius, height = 0.035, 0.22
     areas = np.array([2 * np.pi * radius * height * 0.0005, *(np.pi * radius**2 * each for each in thick_m)])
@@ -284,7 +284,7 @@ def run_annotated(
     paths = {key: folder / key for key in ("canonical.glb", "canonical.npz", "views/")}
     geometry = {"metric": True, "input_to_object": GLTF_TO_OBJECT.tolist()}
     draft = Draft("id", Item(file=None, name=name, given=str(given)), 0, {"geometry": geometry, "cameras": []}, paths)
-    annotator = KeepsGiven(Says(mass_kg=mass or said(0.2)))
+    annotator = ImportedAnnotator(Says(mass_kg=mass or said(0.2)))
     fields: dict[str, Any] = PhysicalStage(PhysicalConfig(), annotator).run(draft, folder)
     return fields
 

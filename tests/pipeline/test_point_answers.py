@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from manitwin.pipeline.point_trials import answer
+from manitwin.pipeline.point_trials import resolve_grasp_points
 from manitwin.twin.point_records import GraspPoint
 
 ENOUGH = 10
@@ -21,14 +21,14 @@ class FakeSearch:
         lost = sum(self._taken.get((other.candidate, point.candidate), 0) for other in others)
         return Counter(held=self._held[point.candidate] - lost)
 
-    def short(self, point: GraspPoint, others: list[GraspPoint]) -> bool:
+    def has_shortfall(self, point: GraspPoint, others: list[GraspPoint]) -> bool:
         return self.outcomes_at(point, others)["held"] < ENOUGH
 
     def search(self, point: GraspPoint, others: list[GraspPoint]) -> None:
         self.passed[point.candidate] = Counter(raw=5)
 
     def shortfall(self, point: GraspPoint, others: list[GraspPoint]) -> str:
-        if not self.short(point, others):
+        if not self.has_shortfall(point, others):
             return ""
         return f"proposals there: {self.passed[point.candidate]['raw']}"
 
@@ -42,7 +42,7 @@ def point(candidate: int) -> GraspPoint:
 
 def test_a_point_that_a_spare_takes_everything_from_is_searched_before_it_is_withdrawn() -> None:
     search = FakeSearch({0: 0, 1: 12, 7: 15, 8: 11}, {(7, 1): 12})
-    answered = answer(search, [point(0), point(1)], [point(7), point(8)])  # type: ignore[arg-type]
+    answered = resolve_grasp_points(search, [point(0), point(1)], [point(7), point(8)])  # type: ignore[arg-type]
     assert [each["candidate"] for each in answered["grasp"]] == [7, 8]
     assert set(search.passed) == {0, 1}
     assert [(each["candidate"], each["shortfall"]) for each in answered["withdrawn"]] == [
@@ -53,7 +53,7 @@ def test_a_point_that_a_spare_takes_everything_from_is_searched_before_it_is_wit
 
 def test_a_spare_with_enough_from_which_a_later_one_takes_is_searched_too() -> None:
     search = FakeSearch({0: 0, 1: 0, 7: 15, 8: 14}, {(8, 7): 9})
-    answered = answer(search, [point(0), point(1)], [point(7), point(8)])  # type: ignore[arg-type]
+    answered = resolve_grasp_points(search, [point(0), point(1)], [point(7), point(8)])  # type: ignore[arg-type]
     assert [each["candidate"] for each in answered["grasp"]] == [7, 8]
     assert 7 in search.passed and answered["grasp"][0]["shortfall"]
     assert not answered["grasp"][1]["shortfall"]

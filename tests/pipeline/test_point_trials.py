@@ -16,7 +16,7 @@ from manitwin.pipeline.grasp_regions import PartedSolid, region_columns
 from manitwin.pipeline.grasps import GraspsStage
 from manitwin.pipeline.point_trials import DISPROVED, PointTrialsStage
 from manitwin.pipeline.quality import agreement_checks, point_checks
-from manitwin.pipeline.tried import POINT_PROPOSALS, POINT_VERDICTS, read_arrays, read_tried
+from manitwin.pipeline.tried_grasps import POINT_PROPOSALS, POINT_VERDICTS, read_arrays, read_tried
 from manitwin.pipeline.verify import VerifyStage
 from manitwin.twin.point_records import GraspPoint
 

@@ -15,8 +15,8 @@ from manitwin.models.graspers.surface_sampling import AntipodalGrasper
 from manitwin.physics.grasp_filters import lowest_points_m
 from manitwin.physics.grasp_selection import Merits
 from manitwin.physics.sapien.trial import SapienTrial
-from manitwin.pipeline.grasps import GraspsStage, picked_from, support_quotas
-from manitwin.pipeline.proposals import Kept, associate, distances_to_grasps
+from manitwin.pipeline.grasps import GraspsStage, pick_support_poses, support_quotas
+from manitwin.pipeline.proposals import ScreenedProposals, associate, distances_to_grasps
 from manitwin.pipeline.verify import VERDICTS, VerifyStage
 from manitwin.robots.grippers.parallel import ParallelGripper
 
@@ -72,7 +72,7 @@ def test_of_what_pads_cannot_bear_a_few_are_asked_for_that_leave_room_for_a_tabl
     poses[:, 0, 3] = np.arange(count) / 100
     made = GraspProposals(poses, np.full(count, 0.02), np.full(count, 0.1), np.ones(count))
     for fit in (np.arange(count) < 30, np.zeros(count, bool)):
-        kept = Kept(made, Merits(fit, ~fit, np.ones(count), 0.05), np.zeros((count, 1)), made, {})
+        kept = ScreenedProposals(made, Merits(fit, ~fit, np.ones(count), 0.05), np.zeros((count, 1)), made, {})
         settings = SETTINGS.model_copy(update={"simulated": 50})
         (likely, wanted), (free, few) = support_quotas(kept, np.arange(count), PANDA, [np.eye(4)], settings)
         assert (likely == fit).all() and wanted == 20
@@ -86,7 +86,7 @@ def test_the_placements_to_pick_from_are_the_likeliest_and_the_likeliest_upright
             "settled": settled,
         }  # fmt: skip
 
-    chosen = picked_from(
+    chosen = pick_support_poses(
         [
             placement(0.3, False, True, 1),
             placement(0.6, True, False, 2),
@@ -95,4 +95,4 @@ def test_the_placements_to_pick_from_are_the_likeliest_and_the_likeliest_upright
         ]
     )
     assert [pose[0, 3] for pose in chosen] == [1, 3]
-    assert picked_from([placement(1.0, True, False, 1)]) == ()
+    assert pick_support_poses([placement(1.0, True, False, 1)]) == ()

@@ -11,7 +11,7 @@ import pytest
 from grasp_drafts import PANDA, Scripted, number_of, proposed_draft, run_all
 from manitwin.config import RobustnessConfig, VerifyConfig
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.robustness import FillCurve, Spread, draw_perturbations
+from manitwin.physics.robustness import FillCurve, PerturbationRanges, draw_perturbations
 from manitwin.physics.trial import TrialResult
 from manitwin.pipeline.robustness import RobustnessStage, rank_values
 from manitwin.twin.grasp_summary import RobustnessSummary
@@ -116,7 +116,7 @@ def test_what_falls_at_first_is_not_tried_again(tmp_path: Path) -> None:
 
 def test_center_of_a_half_empty_vessel_is_moved_by_what_its_own_state_says() -> None:
     filling = FillCurve(np.array([0.1, 0.5]), np.zeros((2, 3)), np.zeros((2, 3, 3)), np.array([0.02, 0.0]))
-    spread = Spread(0.0, 0.0, (1.0, 1.0), (1.0, 1.0), (0.1, 0.5), center_of_mass_m=0.02)
+    spread = PerturbationRanges(0.0, 0.0, (1.0, 1.0), (1.0, 1.0), (0.1, 0.5), center_of_mass_m=0.02)
     body = RigidBody((np.eye(3),), 0.5, np.zeros(3), np.eye(3), 0.5, 0.5)
     shares = []
     for draw in draw_perturbations(spread, 64, 0):

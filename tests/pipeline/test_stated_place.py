@@ -15,7 +15,7 @@ from manitwin.config import MattingConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected, UsageError
 from manitwin.formats.outline_mask import read_mask
-from manitwin.geometry.pixel_boxes import box_of_pixels, share_in_common, to_picture, to_window
+from manitwin.geometry.pixel_boxes import box_of_pixels, crop_to_image_box, image_to_crop_box, intersection_over_union
 from manitwin.pipeline.assembly import _write_source
 from manitwin.pipeline.item import Item, twin_id
 from manitwin.pipeline.manifest import Notes, iterate_items
@@ -298,10 +298,10 @@ def test_a_twin_keeps_them(tmp_path: Path) -> None:
 
 def test_boxes_in_common() -> None:
     assert box_of_pixels(_disc(*RED)) == _around(*RED)
-    assert share_in_common((0, 0, 10, 10), (5, 0, 15, 10)) == pytest.approx(1 / 3)
-    assert share_in_common((0, 0, 10, 10), (20, 0, 30, 10)) == 0
+    assert intersection_over_union((0, 0, 10, 10), (5, 0, 15, 10)) == pytest.approx(1 / 3)
+    assert intersection_over_union((0, 0, 10, 10), (20, 0, 30, 10)) == 0
 
 
 def test_boxes_of_a_window_and_back() -> None:
-    assert to_window((120, 80, 160, 90), (100, 60, 300, 260), 0.5) == (10, 10, 30, 15)
-    assert to_picture((10, 10, 30, 15), (100, 60, 300, 260), (0.5, 0.5)) == (120, 80, 160, 90)
+    assert image_to_crop_box((120, 80, 160, 90), (100, 60, 300, 260), 0.5) == (10, 10, 30, 15)
+    assert crop_to_image_box((10, 10, 30, 15), (100, 60, 300, 260), (0.5, 0.5)) == (120, 80, 160, 90)

@@ -8,7 +8,7 @@ import trimesh
 
 from manitwin.config import MeshConfig
 from manitwin.engine.stage import Draft
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.mesh import MeshStage
 from manitwin.pipeline.stated_volume import factor_to_hold, stated_volume_m3
@@ -22,7 +22,7 @@ from manitwin.pipeline.stated_volume import factor_to_hold, stated_volume_m3
     ],
 )  # fmt: skip
 def test_one_volume_of_a_closed_vessel_is_read(name: str | None, litres: float | None) -> None:
-    found = stated_volume_m3(name, lookup(name))
+    found = stated_volume_m3(name, find_prior(name))
     assert found == (None if litres is None else pytest.approx(1e-3 * litres))
 
 
@@ -67,5 +67,5 @@ def test_a_stated_side_and_a_known_size_come_first(tmp_path: Path) -> None:
 
 def test_walls_of_glass_make_a_bottle_larger() -> None:
     solid = trimesh.creation.cylinder(0.5, 3.0)
-    glass, plastic = (factor_to_hold(solid, 5e-4, lookup(name)) for name in ("glass bottle", "water bottle"))
+    glass, plastic = (factor_to_hold(solid, 5e-4, find_prior(name)) for name in ("glass bottle", "water bottle"))
     assert glass is not None and plastic is not None and 1.1 < (glass / plastic) ** 3 < 1.5

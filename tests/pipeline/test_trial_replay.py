@@ -15,7 +15,7 @@ from manitwin.errors import UsageError
 from manitwin.pipeline.trial_replay import replay_trial
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def change(folder: Path, how: Callable[[dict[str, Any]], None]) -> None:
     record = json.loads((folder / RECORD).read_bytes())
     how(record)
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
 
 
 def test_a_grasp_that_held_holds_again_with_what_the_record_says(folder: Path) -> None:

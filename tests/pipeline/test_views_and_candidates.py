@@ -17,8 +17,8 @@ from manitwin.geometry.distance import distance_to_surface
 from manitwin.pipeline.candidates import CandidatesStage
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.views import ViewsStage
+from manitwin.render.background_colors import marker_color
 from manitwin.render.cameras import Camera, project
-from manitwin.render.grounds import marker_color
 from manitwin.render.surfaces import plain_part
 
 SCALE = 0.5

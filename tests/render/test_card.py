@@ -13,8 +13,8 @@ from PIL import Image
 from manitwin.geometry.poses import transform
 from manitwin.render.cameras import framing_camera, project
 from manitwin.render.card import HEIGHT, PANEL, RED, WIDTH, CardText, make_card, mesh_caption
-from manitwin.render.card_panels import GRASP, CardGrasp, CardPoint, diverse, input_panel
-from manitwin.render.center_of_mass import MassCenter, draw_mass_center
+from manitwin.render.card_panels import GRASP, CardGrasp, CardPoint, input_panel, select_diverse_grasps
+from manitwin.render.center_of_mass import CenterOfMass, draw_center_of_mass
 from manitwin.render.renderer import BACKDROP
 from manitwin.render.surfaces import plain_part
 from manitwin.robots.grippers.gripper import load_gripper
@@ -109,7 +109,7 @@ def test_diverse_grasps_come_from_all_clusters() -> None:
     rng = np.random.default_rng(0)
     poses = np.tile(np.eye(4), (90, 1, 1))
     poses[:, :3, 3] = rng.normal(0, 0.002, (90, 3)) + np.repeat(np.eye(3) * 0.2, 30, axis=0)
-    chosen = diverse(poses, 3)
+    chosen = select_diverse_grasps(poses, 3)
     assert sorted(chosen // 30) == [0, 1, 2]
 
 
@@ -129,17 +129,17 @@ def test_centre_of_mass_is_drawn_where_it_is_with_a_ring_as_wide_as_it_is_uncert
     )
     grey = np.full((200, 200, 3), 128, dtype=np.uint8)
     center = np.array([0.0, 0.01, 0.03])
-    drawn = draw_mass_center(grey, MassCenter(center, 0.02), camera)
+    drawn = draw_center_of_mass(grey, CenterOfMass(center, 0.02), camera)
     changed = np.argwhere((drawn != 128).any(2))[:, ::-1] + 0.5
     pixels, depth = project(center[None], camera)
     away = np.linalg.norm(changed - pixels[0], axis=1)
     assert changed.mean(0) == pytest.approx(pixels[0], abs=0.5)
     ring_px = camera.focal_px * 0.02 / depth[0]
     assert np.median(away[away > ring_px / 2]) == pytest.approx(ring_px, abs=1.0)
-    small = draw_mass_center(grey, MassCenter(center, 0.0), camera)
+    small = draw_center_of_mass(grey, CenterOfMass(center, 0.0), camera)
     assert 40 < (small != 128).any(2).sum() < 200, "the disc alone"
     assert {(0, 0, 0), (1, 1, 1)} <= {tuple(p) for p in (small[(small != 128).any(2)] > 128).astype(int)}
-    assert card(mass=MassCenter(center, 0.01)) != card()
+    assert card(mass=CenterOfMass(center, 0.01)) != card()
 
 
 def test_one_hull_is_no_hulls() -> None:

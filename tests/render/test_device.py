@@ -105,7 +105,7 @@ def test_one_process_of_a_run_looks_for_the_device_and_tells_the_others(monkeypa
     monkeypatch.setattr(
         device.glob, "glob", lambda pattern: ["/lvp_icd.json"] if pattern.startswith("/usr/share") else []
     )
-    with device.looked_for_once():
+    with device.share_device_search():
         forget()
         with pytest.raises(RendererMissing):
             device.require_renderer()

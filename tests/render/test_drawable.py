@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from handmade import mug
-from manitwin.render.drawable import drawable, shows_back_faces
+from manitwin.render.drawable import prepare_drawable, shows_back_faces
 from manitwin.render.procedural_textures import ProceduralTexture, textured_box
 from manitwin.render.surfaces import plain_part
 
@@ -46,22 +46,22 @@ def test_box_of_two_open_halves_hides_them() -> None:
 def test_only_things_that_show_them_are_drawn_from_both_sides() -> None:
     box = trimesh.creation.box([0.1, 0.1, 0.1]).subdivide()
     for mesh, sides in ((box, 1), (without_top(box), 2)):
-        ready = drawable([part(mesh)])
+        ready = prepare_drawable([part(mesh)])
         assert len(ready.surfaces[0].faces) == sides * len(mesh.faces) == len(ready.shadow.faces)
 
 
 def test_textures_are_no_larger_than_asked_for() -> None:
     texture = ProceduralTexture(np.full((256, 128, 3), 90, np.uint8), np.full((256, 128), 140, np.uint8), 0.0, 0.5)
     parts = [textured_box(np.array([0.1, 0.1, 0.1]), texture)]
-    assert drawable(parts).surfaces[0].color_map.shape[:2] == (256, 128)
-    assert drawable(parts, most_texture_px=64).surfaces[0].color_map.shape[:2] == (64, 32)
+    assert prepare_drawable(parts).surfaces[0].color_map.shape[:2] == (256, 128)
+    assert prepare_drawable(parts, most_texture_px=64).surfaces[0].color_map.shape[:2] == (64, 32)
 
 
 def test_creases_of_plain_parts_do_not_keep_their_vertices() -> None:
     """A box whose sides have normals of their own, cut into 768 triangles, is a box of twelve after it was simplified."""
     box = trimesh.creation.box([0.1, 0.06, 0.04]).subdivide().subdivide().subdivide()
     apart = trimesh.Trimesh(box.triangles.reshape(-1, 3), np.arange(3 * len(box.faces)).reshape(-1, 3), process=False)
-    (surface,) = drawable([part(apart)], tolerance_m=0.0004).surfaces
+    (surface,) = prepare_drawable([part(apart)], tolerance_m=0.0004).surfaces
     assert len(surface.faces) < 0.1 * len(box.faces)
     corners = surface.vertices[surface.faces].astype(float)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manitwin.render.grounds import DARK_GROUND, MARKER_COLORS, ground_of_pixels, marker_color, shown_object
+from manitwin.render.background_colors import (
+    DARK_GROUND,
+    MARKER_COLORS,
+    background_of_pixels,
+    foreground_mask,
+    marker_color,
+)
 from manitwin.render.renderer import BACKDROP, Frame
 
 
@@ -24,7 +30,7 @@ def spotted(*colors: tuple[int, int, int]) -> np.ndarray:
      ((30, 30, 30), BACKDROP), ((90, 90, 95), BACKDROP), ((200, 30, 40), BACKDROP)],
 )  # fmt: skip
 def test_light_things_stand_on_darker_ground(color: tuple[int, int, int], ground: tuple[int, int, int]) -> None:
-    assert ground_of_pixels(np.full((500, 3), color, np.uint8)) == ground
+    assert background_of_pixels(np.full((500, 3), color, np.uint8)) == ground
 
 
 @pytest.mark.parametrize("color", MARKER_COLORS)
@@ -43,9 +49,9 @@ def test_moved_to_another_ground_only_the_ground_changes() -> None:
     coverage = np.zeros((4, 4), np.float32)
     coverage[1:3, 1:3] = 1
     rgb = np.where(coverage[..., None] > 0, (10, 200, 30), BACKDROP).astype(np.uint8)
-    moved = Frame(rgb, coverage, coverage).over(BACKDROP, DARK_GROUND)
+    moved = Frame(rgb, coverage, coverage).composited_over(BACKDROP, DARK_GROUND)
     assert (moved[0, 0] == DARK_GROUND).all() and (moved[1, 1] == (10, 200, 30)).all()
-    assert shown_object(moved).sum() == 4
+    assert foreground_mask(moved).sum() == 4
 
 
 def test_dark_red_print_is_red_too() -> None:

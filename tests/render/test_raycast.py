@@ -9,7 +9,7 @@ import trimesh
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
 from manitwin.render.cameras import Camera, look_at
-from manitwin.render.raycast import cast_camera, merged, visible_points
+from manitwin.render.raycast import cast_camera, merge_parts, visible_points
 
 
 def camera_at(eye: tuple[float, float, float], fov_deg: float = 40.0) -> Camera:
@@ -40,7 +40,7 @@ def test_point_behind_another_part_is_hidden() -> None:
     point, normal = np.array([[0.0, -0.05, 0.0]]), np.array([[0.0, -1.0, 0.0]])
     camera = camera_at((0.0, -1.0, 0.0))
     assert visible_points(point, normal, camera, RayCaster(target), 1e-3).all()
-    assert not visible_points(point, normal, camera, RayCaster(merged([target, wall])), 1e-3).any()
+    assert not visible_points(point, normal, camera, RayCaster(merge_parts([target, wall])), 1e-3).any()
 
 
 def test_back_of_a_thin_wall_is_hidden_though_within_tolerance() -> None:

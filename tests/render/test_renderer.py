@@ -14,8 +14,8 @@ from PIL import Image
 from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render.cameras import Camera, framing_camera, look_at, orbit_cameras, project
-from manitwin.render.raycast import cast_camera, merged
-from manitwin.render.renderer import BACKDROP, Renderer, pixels_a_unit, shared_renderer
+from manitwin.render.raycast import cast_camera, merge_parts
+from manitwin.render.renderer import BACKDROP, Renderer, max_pixels_per_unit, shared_renderer
 from manitwin.render.surfaces import plain_part
 
 DIGEST = """
@@ -63,7 +63,7 @@ def front_camera(distance: float = 1.0, size: int = 64) -> Camera:
 @pytest.mark.parametrize("supersample", [1, 2])
 def test_depth_and_mask_are_those_of_rays(renderer: Renderer, supersample: int) -> None:
     parts = scene()
-    whole = merged(parts)
+    whole = merge_parts(parts)
     for camera in orbit_cameras(whole.vertices, fov_y_deg=30.0, size_px=160)[:4]:
         frame = renderer.render(parts, [camera], supersample=supersample)[0]
         depth, _, face = cast_camera(RayCaster(whole), camera)
@@ -177,8 +177,8 @@ def test_textures_are_let_go_with_the_pictures_that_they_were_for(
 def test_the_nearest_camera_says_how_fine_a_texture_is_seen() -> None:
     near, far = (Camera(look_at(np.array([d, 0, 0]), np.zeros(3)), np.radians(40), 256, 256) for d in (0.5, 2.0))
     of_far = 256 / 2.0 / (2 * np.tan(np.radians(40) / 2))
-    assert pixels_a_unit([far], np.zeros(3), 0.1) == pytest.approx(of_far)
-    assert pixels_a_unit([far, near], np.zeros(3), 0.1) == pytest.approx(4 * of_far)
+    assert max_pixels_per_unit([far], np.zeros(3), 0.1) == pytest.approx(of_far)
+    assert max_pixels_per_unit([far, near], np.zeros(3), 0.1) == pytest.approx(4 * of_far)
 
 
 def test_fine_textures_are_averaged_for_small_pictures(renderer: Renderer) -> None:

@@ -24,12 +24,12 @@ def test_white_paper_is_exposed_as_promised_under_any_light() -> None:
             DirectionalLight(np.append(rng.normal(size=2), -rng.uniform(0.2, 2)), rng.uniform(0, 5, 3))
             for _ in range(3)
         )
-        exposed = Lighting(rng.uniform(0.01, 2, 3), lights).exposed()
+        exposed = Lighting(rng.uniform(0.01, 2, 3), lights).with_auto_exposure()
         assert level_luminance(exposed) == pytest.approx(WHITE_PAPER)
 
 
 def test_ratios_and_colours_of_lights_stay() -> None:
-    exposed = STUDIO.exposed()
+    exposed = STUDIO.with_auto_exposure()
     factor = exposed.ambient / STUDIO.ambient
     np.testing.assert_allclose(factor, factor[0])
     for before, after in zip(STUDIO.lights, exposed.lights, strict=True):
@@ -40,4 +40,4 @@ def test_ratios_and_colours_of_lights_stay() -> None:
 
 def test_light_from_below_counts_nothing_and_darkness_stays_dark() -> None:
     below = Lighting(np.zeros(3), (DirectionalLight(np.array([0.0, 0, 1]), np.ones(3)),))
-    np.testing.assert_array_equal(below.exposed().lights[0].color, np.ones(3))
+    np.testing.assert_array_equal(below.with_auto_exposure().lights[0].color, np.ones(3))

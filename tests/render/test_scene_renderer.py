@@ -17,7 +17,7 @@ from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render import scene_renderer
 from manitwin.render.cameras import Camera, look_at, pixel_rays, project
-from manitwin.render.drawable import drawable
+from manitwin.render.drawable import prepare_drawable
 from manitwin.render.procedural_textures import ProceduralTexture, textured_box
 from manitwin.render.raycast import cast_camera
 from manitwin.render.scene_lighting import WHITE_PAPER, DirectionalLight, Lighting
@@ -57,7 +57,7 @@ CAMERAS = [camera([0.9, -0.3, 0.7], [0, 0, 0.03]), camera([0.1, -1.0, 0.4], [0, 
 
 def filled(renderer: SceneRenderer, tolerance_m: float = 0.0) -> SceneRenderer:
     for name, (mesh, pose) in THINGS.items():
-        renderer.add(name, drawable([plain_part(mesh, (200, 80, 40))], tolerance_m=tolerance_m), pose)
+        renderer.add(name, prepare_drawable([plain_part(mesh, (200, 80, 40))], tolerance_m=tolerance_m), pose)
     return renderer
 
 
@@ -149,7 +149,7 @@ def lit_table(
     with SceneRenderer(lighting, surroundings=None) as made:
         made.add("table", [plain_part(slab(), (255, 255, 255), roughness=1.0)])
         for index, (mesh, pose) in enumerate(things):
-            made.add(str(index), drawable([plain_part(mesh, (255, 255, 255))], **kind), pose)
+            made.add(str(index), prepare_drawable([plain_part(mesh, (255, 255, 255))], **kind), pose)
         rgb = made.render([view])[0].rgb
     return (rgb.astype(float) / 255) ** 2.2
 
@@ -297,7 +297,7 @@ def test_thing_that_is_shown_again_is_uploaded_once_and_looks_the_same(monkeypat
         return scene_shape(*arguments, **options)
 
     monkeypatch.setattr(scene_renderer, "scene_shape", counted)
-    thing = drawable([plain_part(THINGS["ring"][0], (200, 80, 40))])
+    thing = prepare_drawable([plain_part(THINGS["ring"][0], (200, 80, 40))])
     frames = []
     for _ in range(2):
         with SceneRenderer(ONE_LIGHT, surroundings=None) as renderer:
@@ -311,7 +311,7 @@ def test_thing_that_is_shown_again_is_uploaded_once_and_looks_the_same(monkeypat
 
 
 def test_what_was_uploaded_goes_with_the_thing() -> None:
-    thing = drawable([plain_part(THINGS["ball"][0], (200, 80, 40))])
+    thing = prepare_drawable([plain_part(THINGS["ball"][0], (200, 80, 40))])
     with SceneRenderer(ONE_LIGHT) as renderer:
         renderer.add("ball", thing)
     assert thing in scene_renderer._shapes

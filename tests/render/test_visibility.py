@@ -6,10 +6,10 @@ import numpy as np
 import trimesh
 
 from manitwin.render.cameras import orbit_cameras
-from manitwin.render.drawable import drawable
+from manitwin.render.drawable import prepare_drawable
 from manitwin.render.renderer import shared_renderer
 from manitwin.render.surfaces import plain_part
-from manitwin.render.visibility import faces_seen_from_outside, is_closed_and_outward
+from manitwin.render.visibility import externally_visible_faces, is_closed_and_outward
 
 
 def box(side_m: float) -> trimesh.Trimesh:
@@ -17,7 +17,7 @@ def box(side_m: float) -> trimesh.Trimesh:
 
 
 def both_sides(mesh: trimesh.Trimesh) -> list[np.ndarray]:
-    return [faces_seen_from_outside(mesh, from_behind=behind) for behind in (False, True)]
+    return [externally_visible_faces(mesh, from_behind=behind) for behind in (False, True)]
 
 
 def together(*meshes: trimesh.Trimesh) -> trimesh.Trimesh:
@@ -53,7 +53,7 @@ def test_open_box_shows_what_is_in_it_and_its_walls_from_behind() -> None:
 def test_part_of_a_long_triangle_that_shows_is_enough() -> None:
     """A bar that is stuck in a box by nine tenths: its sides, two triangles each, are seen."""
     bar = trimesh.creation.box([0.02, 0.02, 0.1]).apply_translation([0, 0, 0.01])
-    front = faces_seen_from_outside(together(box(0.1), bar))
+    front = externally_visible_faces(together(box(0.1), bar))
     sides = np.abs(bar.face_normals[:, 2]) < 0.5
     assert front[12:][sides].sum() >= 4 and front[12:][bar.face_normals[:, 2] > 0.5].all()
     assert not front[12:][bar.face_normals[:, 2] < -0.5].any()
@@ -61,18 +61,18 @@ def test_part_of_a_long_triangle_that_shows_is_enough() -> None:
 
 def test_drawable_leaves_out_what_is_hidden_where_it_is_asked_to() -> None:
     parts = [plain_part(box(0.1), (200, 80, 40)), plain_part(box(0.03), (20, 80, 40))]
-    assert [len(s.faces) for s in drawable(parts).surfaces] == [12, 12]
-    lean = drawable(parts, hidden_left_out=True)
+    assert [len(s.faces) for s in prepare_drawable(parts).surfaces] == [12, 12]
+    lean = prepare_drawable(parts, hidden_left_out=True)
     assert [len(s.faces) for s in lean.surfaces] == [12] and len(lean.shadow.faces) == 12
-    assert lean.surfaces[0].color == drawable(parts).surfaces[0].color
+    assert lean.surfaces[0].color == prepare_drawable(parts).surfaces[0].color
 
 
 def test_drawable_has_backs_of_those_faces_alone_that_are_seen_from_behind() -> None:
     """An open box beside a closed one."""
     closed = box(0.08).apply_translation([0.2, 0, 0])
     parts = [plain_part(without_lid(box(0.1)), (200, 80, 40)), plain_part(closed, (20, 80, 40))]
-    assert [len(s.faces) for s in drawable(parts).surfaces] == [20, 24]
-    lean = drawable(parts, hidden_left_out=True)
+    assert [len(s.faces) for s in prepare_drawable(parts).surfaces] == [20, 24]
+    lean = prepare_drawable(parts, hidden_left_out=True)
     assert [len(s.faces) for s in lean.surfaces] == [20, 12] and len(lean.shadow.faces) == 32
 
 

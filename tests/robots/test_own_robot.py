@@ -13,14 +13,14 @@ from small_arm import box, mesh, small_arm
 
 from manitwin.errors import Unavailable, UsageError
 from manitwin.robots.definition import RobotDefinition
-from manitwin.robots.links import links_of_urdf, poses_at
+from manitwin.robots.links import poses_at, read_urdf_links
 from manitwin.robots.load import load_robot
 
 
 def test_own_urdf_with_generated_hand_has_the_forward_kinematics_of_its_lengths(tmp_path: Path):
     robot = load_robot(small_arm(tmp_path))
     turn, lift = 0.3, 0.5
-    poses = poses_at(links_of_urdf(robot.urdf), dict(zip(robot.arm_joints, (turn, lift, 0.0), strict=True)))
+    poses = poses_at(read_urdf_links(robot.urdf), dict(zip(robot.arm_joints, (turn, lift, 0.0), strict=True)))
     tips = poses[robot.tip_link] @ robot.gripper_to_tip @ np.array([0, 0, robot.gripper.tip_depth_m, 1])
     radius = 0.4 + np.cos(lift) * (0.4 + robot.gripper.tip_depth_m)
     height = 0.3 - np.sin(lift) * (0.4 + robot.gripper.tip_depth_m)  # the stand of 1 m below the base is dropped
@@ -33,7 +33,7 @@ def test_meshes_are_found_beside_the_urdf_and_below_the_package_folder(tmp_path:
     trimesh.creation.box((0.3, 0.05, 0.05)).export(tmp_path / "parts" / "link.stl")
     robot = load_robot(small_arm(tmp_path, upper=mesh("parts/link.stl"), fore=mesh("package://parts/link.stl")))
     assert robot.urdf.count(str(tmp_path / "parts" / "link.stl")) == 2
-    corners = next(link for link in links_of_urdf(robot.urdf) if link.name == "upper").shapes[0].corners_m
+    corners = next(link for link in read_urdf_links(robot.urdf) if link.name == "upper").shapes[0].corners_m
     assert np.allclose(np.abs(corners), [0.15, 0.025, 0.025])
 
 
@@ -53,7 +53,7 @@ def test_continuous_joint_becomes_revolute_within_the_limits_that_are_given(tmp_
         load_robot(small_arm(tmp_path, urdf=change))
     given = ("[workspace]", "[limits_rad]\nturn = [-1.5, 1.5]\n\n[workspace]")
     robot = load_robot(small_arm(tmp_path, urdf=change, toml=given))
-    turn = next(link for link in links_of_urdf(robot.urdf) if link.joint == "turn")
+    turn = next(link for link in read_urdf_links(robot.urdf) if link.joint == "turn")
     assert turn.joint_type == "revolute" and turn.limits == (-1.5, 1.5)
 
 
@@ -67,7 +67,7 @@ def test_a_joint_of_neither_arm_nor_hand_is_fixed_where_the_file_says(tmp_path: 
     with pytest.raises(UsageError, match="fixed_joints must give a position for door"):
         load_robot(small_arm(tmp_path, upper=upper, urdf=door))
     given = ("[urdf]", "[fixed_joints]\ndoor = 0.25\n\n[urdf]")
-    poses = poses_at(links_of_urdf(load_robot(small_arm(tmp_path, urdf=door, toml=given)).urdf), {})
+    poses = poses_at(read_urdf_links(load_robot(small_arm(tmp_path, urdf=door, toml=given)).urdf), {})
     assert np.allclose(poses["flap"][:3, 3] - poses["upper"][:3, 3], [0, 0, 0.35])
 
 
@@ -205,7 +205,7 @@ def _with_own_hand(folder: Path, replaced: tuple[str, str] = ("", ""), hand: tup
 def test_own_hand_loses_its_mimicry_and_gets_the_grippers_range(tmp_path: Path):
     robot = load_robot(_with_own_hand(tmp_path))
     assert "mimic" not in robot.urdf
-    limits = {link.joint: link.limits for link in links_of_urdf(robot.urdf)}
+    limits = {link.joint: link.limits for link in read_urdf_links(robot.urdf)}
     assert limits["left"] == limits["right"] == (0.0, 0.04)
     assert robot.hand_links == ("flange", "left_finger", "right_finger")
 

@@ -11,7 +11,7 @@ from lxml import etree
 from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.suction import SuctionGripper
-from manitwin.robots.links import bodies_of_urdf, links_of_urdf, poses_at
+from manitwin.robots.links import poses_at, read_rigid_bodies, read_urdf_links
 from manitwin.robots.load import load_robot, shipped_robots
 from manitwin.robots.robot import Robot
 
@@ -42,7 +42,7 @@ def test_links_are_where_mujoco_has_them(robot: Robot):
     model = _mujoco_model(robot)
     data = mujoco.MjData(model)
     rng = np.random.default_rng(5)
-    links = links_of_urdf(robot.urdf)
+    links = read_urdf_links(robot.urdf)
     for _ in range(5):
         joints = {}
         for name in (*robot.arm_joints, *robot.finger_joints):
@@ -58,7 +58,7 @@ def test_links_are_where_mujoco_has_them(robot: Robot):
 @pytest.mark.parametrize("name", JAWS)
 def test_hand_points_out_of_the_flange_and_its_tips_are_at_the_grippers_depth(name: str):
     robot = load_robot(name)
-    links = links_of_urdf(robot.urdf)
+    links = read_urdf_links(robot.urdf)
     half_m = 0.01
     poses = poses_at(links, dict(zip(robot.finger_joints, (half_m, half_m), strict=True)))
     flange_to_grasp = inverse(poses[robot.tip_link] @ robot.gripper_to_tip) @ poses[FLANGES[robot.name]]
@@ -77,7 +77,7 @@ def test_hand_points_out_of_the_flange_and_its_tips_are_at_the_grippers_depth(na
 def test_a_cups_lip_lies_in_the_plane_of_its_file_and_is_as_wide():
     robot = load_robot("ur5_suction")
     assert isinstance(robot.gripper, SuctionGripper)
-    lip = next(link for link in links_of_urdf(robot.urdf) if link.name == robot.finger_links[0])
+    lip = next(link for link in read_urdf_links(robot.urdf) if link.name == robot.finger_links[0])
     corners = np.concatenate([transform_points(shape.shape_to_link, shape.corners_m) for shape in lip.shapes])
     assert corners[:, 2].max() == pytest.approx(robot.gripper.tip_depth_m)
     assert np.linalg.norm(corners[:, :2], axis=1).max() == pytest.approx(robot.gripper.lip_radius_m)
@@ -89,17 +89,21 @@ def test_fingers_of_a_mounted_hand_are_where_its_gripper_has_them():
     robot = load_robot("xarm7_allegro")
     assert isinstance(robot.gripper, MultiFingerGripper)
     joints = robot.gripper.postures[1].joints_at(np.array(0.03))
-    poses = poses_at(links_of_urdf(robot.urdf), dict(zip(robot.finger_joints, joints.tolist(), strict=True)))
+    poses = poses_at(read_urdf_links(robot.urdf), dict(zip(robot.finger_joints, joints.tolist(), strict=True)))
     to_grasp = inverse(poses[robot.tip_link] @ robot.gripper_to_tip)
     for link, pose in zip(robot.gripper.links, robot.gripper.link_poses(joints), strict=True):
         assert np.allclose(to_grasp @ poses[link.name], pose, atol=1e-9)
-    assert {robot.side_of(name) for name in robot.gripper.fingers[0]} == {0} == {robot.side_of(robot.hand_links[0])}
-    assert {robot.side_of(name) for links in robot.gripper.fingers[1:] for name in links} == {1}
-    assert robot.side_of("link7") is None
+    assert (
+        {robot.contact_side(name) for name in robot.gripper.fingers[0]}
+        == {0}
+        == {robot.contact_side(robot.hand_links[0])}
+    )
+    assert {robot.contact_side(name) for links in robot.gripper.fingers[1:] for name in links} == {1}
+    assert robot.contact_side("link7") is None
 
 
 def test_home_is_free_of_the_table_and_points_down(robot: Robot):
-    poses = poses_at(links_of_urdf(robot.urdf), dict(zip(robot.arm_joints, robot.home_rad, strict=True)))
+    poses = poses_at(read_urdf_links(robot.urdf), dict(zip(robot.arm_joints, robot.home_rad, strict=True)))
     grasp = poses[robot.tip_link] @ robot.gripper_to_tip
     assert grasp[2, 2] < -0.99
     tips_m = grasp[:3, 3] + robot.gripper.tip_depth_m * grasp[:3, 2]
@@ -108,7 +112,7 @@ def test_home_is_free_of_the_table_and_points_down(robot: Robot):
 
 
 def test_bodies_have_the_inertias_that_pinocchio_joins(robot: Robot):
-    bodies, part_of = bodies_of_urdf(robot.urdf, robot.hand_links[0])
+    bodies, part_of = read_rigid_bodies(robot.urdf, robot.hand_links[0])
     model = pin.buildModelFromXML(robot.urdf)
     hand = part_of[robot.hand_links[0]][0]
     by_joint = {body.joint: body for body in bodies if body.joint_type != "fixed"}
@@ -125,7 +129,7 @@ def test_bodies_have_the_inertias_that_pinocchio_joins(robot: Robot):
 
 
 def test_generated_hand_weighs_what_its_file_says_and_balances_on_the_approach_axis():
-    bodies, _ = bodies_of_urdf(load_robot("ur5_robotiq").urdf, "robotiq_2f85_palm")
+    bodies, _ = read_rigid_bodies(load_robot("ur5_robotiq").urdf, "robotiq_2f85_palm")
     hand = [body for body in bodies if body.name.startswith("robotiq")]
     masses = np.array([body.mass_kg for body in hand])
     centers = np.array([body.center_of_mass_m for body in hand])

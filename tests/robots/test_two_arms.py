@@ -16,7 +16,7 @@ from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.robot import SapienRobot
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.robots.load import load_robot
-from manitwin.robots.two_arms import base_to_world, placed_arm
+from manitwin.robots.two_arms import base_to_world, place_arm
 from rigid_boxes import box
 
 TWO = """
@@ -105,7 +105,7 @@ def test_two_arms_are_put_into_a_scene_one_by_one() -> None:
 
 def test_an_arm_without_a_base_of_its_own_is_where_it_was() -> None:
     panda = load_robot("panda")
-    there = placed_arm(panda, "arm", np.eye(4))
+    there = place_arm(panda, "arm", np.eye(4))
     np.testing.assert_allclose(
         ArmKinematics(there).gripper_pose(panda.home_rad), ArmKinematics(panda).gripper_pose(panda.home_rad), atol=1e-12
     )
@@ -137,15 +137,15 @@ def test_arms_that_meet_stop_one_another_and_that_is_told() -> None:
         assert any(one.startswith("giver_") and other.startswith("taker_") for one, other in seen)
         free_m = ArmKinematics(giver.robot).gripper_pose(forward_rad)[0, 3]
         assert giver.gripper_pose()[0, 3] < free_m - 0.01, "it was stopped"
-        pressing = made.contacts.pressing(made.contacts.read())
+        pressing = made.contacts.pressing_pairs(made.contacts.read())
         assert frozenset({"giver", "taker"}) in pressing
         del giver, taker
 
 
 def test_each_arm_s_fingers_are_those_of_its_own_reader() -> None:
     with world() as made:
-        made.use(1)
+        made.select_arm(1)
         assert made.robot.robot.name == "taker"
         assert made.contacts is made.readers[1]
-        made.use(0)
+        made.select_arm(0)
         assert made.robot.robot.name == "giver"

@@ -10,7 +10,7 @@ import pytest
 
 from drawn_scenes import write_scenes
 from manitwin.errors import TwinError
-from manitwin.scenes.twin_looks import seen_shape, simplified_twin_looks, twin_looks
+from manitwin.scenes.twin_surfaces import raycast_shape, simplified_twin_drawable, twin_drawable
 from manitwin.twin.store import RECORD
 
 
@@ -21,19 +21,23 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_looks_are_read_once(folder: Path) -> None:
-    assert twin_looks(folder, 128) is twin_looks(folder, 128)
-    assert twin_looks(folder, 128) is not twin_looks(folder, 256)
-    assert seen_shape(folder) is seen_shape(folder)
-    assert simplified_twin_looks(folder, 0.001) is simplified_twin_looks(folder, 0.001)
+    assert twin_drawable(folder, 128) is twin_drawable(folder, 128)
+    assert twin_drawable(folder, 128) is not twin_drawable(folder, 256)
+    assert raycast_shape(folder) is raycast_shape(folder)
+    assert simplified_twin_drawable(folder, 0.001) is simplified_twin_drawable(folder, 0.001)
 
 
 def test_twin_that_was_built_again_is_read_again(folder: Path) -> None:
-    looks, shape, simplified = twin_looks(folder, 128), seen_shape(folder), simplified_twin_looks(folder, 0.001)
+    looks, shape, simplified = (
+        twin_drawable(folder, 128),
+        raycast_shape(folder),
+        simplified_twin_drawable(folder, 0.001),
+    )
     record = json.loads((folder / RECORD).read_text())
     (folder / RECORD).write_text(json.dumps(record, indent=4) + "\n")
-    assert twin_looks(folder, 128) is not looks
-    assert simplified_twin_looks(folder, 0.001) is not simplified
-    again = seen_shape(folder)
+    assert twin_drawable(folder, 128) is not looks
+    assert simplified_twin_drawable(folder, 0.001) is not simplified
+    again = raycast_shape(folder)
     assert again is not shape
     assert np.array_equal(again.vertices_m, shape.vertices_m)
 
@@ -41,13 +45,13 @@ def test_twin_that_was_built_again_is_read_again(folder: Path) -> None:
 def test_a_surface_that_was_cut_short_is_to_be_built_again(folder: Path) -> None:
     visual = folder / "visual.glb"
     visual.write_bytes(visual.read_bytes()[:-40])
-    for look in (lambda: twin_looks(folder, 131), lambda: simplified_twin_looks(folder, 0.0013)):
+    for look in (lambda: twin_drawable(folder, 131), lambda: simplified_twin_drawable(folder, 0.0013)):
         with pytest.raises(TwinError, match=r"cannot be read .*build the twin again"):
             look()
 
 
 def test_missing_twin_is_said(tmp_path: Path) -> None:
     with pytest.raises(TwinError):
-        twin_looks(tmp_path / "none", 128)
+        twin_drawable(tmp_path / "none", 128)
     with pytest.raises(TwinError):
-        seen_shape(tmp_path / "none")
+        raycast_shape(tmp_path / "none")

@@ -12,16 +12,16 @@ from typer.testing import CliRunner
 
 from manitwin.cli.main import app
 from manitwin.errors import TwinError, UsageError
+from manitwin.scenes.changed_twins import CurrentTwinStates, find_changed_twins, require_same_twins
 from manitwin.scenes.layouts.layouts_run import make_layouts
-from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.layouts.pool import cached_pool
 from manitwin.scenes.scene import SCENE, SceneRecord
 from manitwin.scenes.scene_files import read_scene, scene_bytes, scene_files
 from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
-from manitwin.scenes.twins_now import StatesNow, changed_twins, require_same_twins
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import TwinSource
-from manitwin.twin.record_digests import body_sha256, state_of
-from manitwin.twin.store import RECORD, canonical_json, read_record, seal
+from manitwin.twin.record_digests import body_sha256, twin_state
+from manitwin.twin.store import RECORD, canonical_json, read_record, write_twin_record
 from scene_twins import slab, write_thing
 
 Amend = Callable[[dict[str, Any], Path], None]
@@ -48,8 +48,8 @@ def amend(twins: Path, twin_id: str, change: Amend) -> None:
     record = json.loads((folder / RECORD).read_bytes())
     change(record, folder)
     del record["revision"], record["files"]
-    seal(folder, record)
-    pool_of.cache_clear()
+    write_twin_record(folder, record)
+    cached_pool.cache_clear()
 
 
 def words(record: dict[str, Any], folder: Path) -> None:
@@ -152,13 +152,13 @@ def test_twin_that_cannot_be_read_is_left_to_what_reads_it(twins: Path, scene: S
 def test_many_twins_are_counted(scene: SceneRecord) -> None:
     first = scene.objects[0]
     objects = tuple(first.model_copy(update={"twin_id": f"twin_{number}"}) for number in range(5))
-    found = changed_twins([scene.model_copy(update={"objects": objects}), scene], lambda twin_id: None)
-    assert len(found.changed) == 7 and found.line is not None
-    assert " and 4 more changed" in found.line and "2 of 2 scenes" in found.line
+    found = find_changed_twins([scene.model_copy(update={"objects": objects}), scene], lambda twin_id: None)
+    assert len(found.changed) == 7 and found.changed_remark is not None
+    assert " and 4 more changed" in found.changed_remark and "2 of 2 scenes" in found.changed_remark
 
 
 def test_states_are_those_of_the_records(twins: Path, scene: SceneRecord) -> None:
-    now = StatesNow(TwinSource(twins))
+    now = CurrentTwinStates(TwinSource(twins))
     for each in scene.objects:
         record = read_record(twins / twin_name(each.twin_id))
         state = now(each.twin_id)
@@ -170,4 +170,4 @@ def test_states_are_those_of_the_records(twins: Path, scene: SceneRecord) -> Non
 
 def test_what_is_no_record_says_so() -> None:
     with pytest.raises(TwinError, match=r"a/twin\.json: not a record of a twin.*build the twin again"):
-        state_of({"revision": "x", "placements": [1]}, "a/twin.json")
+        twin_state({"revision": "x", "placements": [1]}, "a/twin.json")

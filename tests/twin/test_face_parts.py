@@ -11,7 +11,7 @@ from manitwin.formats.npy_file import labels_to_npy
 from manitwin.twin.grasp_table import SCHEMA, read_grasp_table
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import FACE_PARTS
-from manitwin.twin.store import RECORD, parse_record, seal
+from manitwin.twin.store import RECORD, parse_record, write_twin_record
 from twin_folders import twin_name, write_accepted
 
 PART = {"id": "p0", "name": "lid", "source": "geometry", "confidence": 0.8, "faces": 2, "area_share": 0.2}
@@ -24,7 +24,7 @@ def with_parts(root: Path, parts: list[dict[str, Any]], labels: np.ndarray | Non
         (folder / FACE_PARTS).write_bytes(labels_to_npy(labels))
     record = parse_record((folder / RECORD).read_bytes()).model_dump(mode="json")
     del record["revision"]
-    seal(folder, record | {"parts": [part | {"centroid_m": [0, 0, 0]} for part in parts]})
+    write_twin_record(folder, record | {"parts": [part | {"centroid_m": [0, 0, 0]} for part in parts]})
     return folder
 
 

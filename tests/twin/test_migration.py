@@ -5,9 +5,17 @@ import pytest
 from rejected_records import rejected_record
 
 from manitwin.errors import NewerVersion, TwinError
-from manitwin.twin.migration import SCHEMA_VERSION, migrated
+from manitwin.twin.migration import SCHEMA_VERSION, migrate_record
 from manitwin.twin.point_records import FunctionalPoint, Points
-from manitwin.twin.store import RECORD, amend, canonical_json, parse_record, read_record, revision_of, seal
+from manitwin.twin.store import (
+    RECORD,
+    canonical_json,
+    parse_record,
+    read_record,
+    replace_files,
+    revision_of,
+    write_twin_record,
+)
 
 POINT = {
     "id": "f0", "candidate": 0, "position_m": [0, 0, 0], "normal": [0, 0, 1], "label": "tip", "description": "a tip",
@@ -20,7 +28,7 @@ def of_version_1(tmp_path: Path) -> Path:
     folder = tmp_path / "abc"
     folder.mkdir()
     (folder / "source.png").write_bytes(b"")
-    seal(folder, rejected_record())
+    write_twin_record(folder, rejected_record())
     said = json.loads((folder / RECORD).read_text()) | {"schema_version": 1}
     said["points"] = {
         "candidates": {"positions_m": [[0, 0, 0]], "normals": [[0, 0, 1]]},
@@ -37,7 +45,7 @@ def test_record_of_version_1_is_read_verified_without_frames(of_version_1: Path)
     assert record.schema_version == SCHEMA_VERSION
     assert record.points is not None and record.points.functional[0].frame is None
     assert record.points.candidates.refined == []
-    assert migrated({"schema_version": 2, "name": "x"}) == {"schema_version": SCHEMA_VERSION, "name": "x"}
+    assert migrate_record({"schema_version": 2, "name": "x"}) == {"schema_version": SCHEMA_VERSION, "name": "x"}
     content = (of_version_1 / RECORD).read_bytes()
     assert parse_record(content, sealed=True).revision == json.loads(content)["revision"]
 
@@ -49,14 +57,14 @@ def test_altered_record_of_version_1_is_refused(of_version_1: Path) -> None:
 
 
 def test_amended_record_of_version_1_is_written_in_the_present_one(of_version_1: Path) -> None:
-    amend(of_version_1, {"source.png": b"x"})
+    replace_files(of_version_1, {"source.png": b"x"})
     assert json.loads((of_version_1 / RECORD).read_text())["schema_version"] == SCHEMA_VERSION
     read_record(of_version_1, verify=True)
 
 
 @pytest.mark.parametrize("version", [None, "1", 1.0, True, 0, 99, [1]])
 def test_unknown_version_is_left_as_it_is(version: object) -> None:
-    assert migrated({"schema_version": version}) == {"schema_version": version}
+    assert migrate_record({"schema_version": version}) == {"schema_version": version}
 
 
 def test_frame_that_is_no_rotation_is_refused() -> None:

@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.twin.record import Placement
-from manitwin.twin.resting import UPRIGHT_DEG, rest_of, resting_poses, side_down, tilt_deg
+from manitwin.twin.resting import UPRIGHT_DEG, classify_rest, resting_poses, side_down, tilt_deg
 
 
 def turned(axis: str, degrees: float) -> np.ndarray:
@@ -24,8 +24,8 @@ def turned(axis: str, degrees: float) -> np.ndarray:
     ],
 )
 def test_a_rest_is_told_by_where_up_points(axis: str, degrees: float, rest: str) -> None:
-    assert rest_of(turned(axis, degrees)) == rest
-    assert rest_of(turned("z", 77) @ turned(axis, degrees)) == rest, "the heading says nothing of it"
+    assert classify_rest(turned(axis, degrees)) == rest
+    assert classify_rest(turned("z", 77) @ turned(axis, degrees)) == rest, "the heading says nothing of it"
     assert tilt_deg(turned(axis, degrees)) == pytest.approx(0 if axis == "z" else degrees)
 
 

@@ -6,19 +6,19 @@ import pytest
 
 from manitwin.dataset.index.rows import rows_of
 from manitwin.errors import TwinError
-from manitwin.twin.shape_file import SHAPE, read_shape, shape_of, shape_to_json
+from manitwin.twin.shape_file import SHAPE, compute_shape, read_shape, shape_to_json
 from twin_folders import twin_name, write_accepted
 
 
 def described(root: Path) -> Path:
     folder = root / twin_name(write_accepted(root, 1))
-    (folder / SHAPE).write_bytes(shape_to_json(shape_of(folder / "visual.glb")))
+    (folder / SHAPE).write_bytes(shape_to_json(compute_shape(folder / "visual.glb")))
     return folder
 
 
 def test_shape_comes_back_to_the_last_bit(tmp_path: Path) -> None:
     folder = described(tmp_path)
-    said, measured = read_shape(folder), shape_of(folder / "visual.glb")
+    said, measured = read_shape(folder), compute_shape(folder / "visual.glb")
     assert said is not None and said.values.dtype == np.float32
     assert np.array_equal(said.values, measured.values) and said.radius_of_gyration_m == measured.radius_of_gyration_m
 

@@ -6,7 +6,7 @@ from rejected_records import rejected_record
 
 from manitwin.errors import TwinError, UsageError
 from manitwin.twin.migration import SCHEMA_VERSION
-from manitwin.twin.store import read_record, replace_folder, revision_of, seal, write_bytes_atomically
+from manitwin.twin.store import read_record, replace_folder, revision_of, write_bytes_atomically, write_twin_record
 
 
 @pytest.fixture
@@ -14,7 +14,7 @@ def sealed(tmp_path: Path) -> Path:
     folder = tmp_path / "abc"
     folder.mkdir()
     (folder / "source.png").write_bytes(b"")
-    seal(folder, rejected_record())
+    write_twin_record(folder, rejected_record())
     return folder
 
 
@@ -28,7 +28,7 @@ def test_sealed_folder_reads_back_verified(sealed: Path) -> None:
 def test_run_json_is_not_part_of_the_revision(sealed: Path) -> None:
     (sealed / "run.json").write_text("{}")
     before = read_record(sealed, verify=True).revision
-    assert seal(sealed, rejected_record()).revision == before
+    assert write_twin_record(sealed, rejected_record()).revision == before
 
 
 @pytest.mark.parametrize("alter", ["content", "missing", "record"])

@@ -20,7 +20,7 @@ from manitwin.assets.importers.importer import import_assets
 from manitwin.errors import TwinError
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.store import RECORD, canonical_json, read_record, revision_of, seal
+from manitwin.twin.store import RECORD, canonical_json, read_record, revision_of, write_twin_record
 from scene_twins import slab, write_thing
 from twin_folders import twin_id, write_accepted
 
@@ -186,6 +186,8 @@ def test_controls_of_a_name_are_written_out_when_a_twin_is_sealed(tmp_path: Path
     folder = tmp_path / twin_name(twin_id(1))
     record = json.loads((folder / RECORD).read_text())
     record["language"]["caption"] = "a\x1b[2J\x00 mug\nof clay"
-    sealed = seal(folder, {key: value for key, value in record.items() if key not in ("files", "revision")})
+    sealed = write_twin_record(
+        folder, {key: value for key, value in record.items() if key not in ("files", "revision")}
+    )
     assert sealed.language is not None and sealed.language.caption == "a\\x1b[2J\\x00 mug\nof clay"
     assert read_record(folder, verify=True) == sealed

@@ -30,7 +30,7 @@ from manitwin.models.annotators.vlm.annotator import VlmAnnotator
 from manitwin.models.vlm.protocol import Picture, Turn
 from manitwin.pipeline.candidates import choose_candidates
 from manitwin.render.cameras import orbit_cameras
-from manitwin.render.raycast import merged
+from manitwin.render.raycast import merge_parts
 from manitwin.render.renderer import shared_renderer
 
 pytestmark = [pytest.mark.slow, pytest.mark.vlm_real]
@@ -49,7 +49,7 @@ def request_(tmp_path_factory: pytest.TempPathFactory) -> PointsRequest:
     for index, frame in enumerate(shared_renderer().render(parts, cameras)):
         views.append(folder / f"rgb_{index:02d}.webp")
         Image.fromarray(frame.rgb).save(views[-1])
-    caster, rng = RayCaster(merged(list(parts))), np.random.default_rng(0)
+    caster, rng = RayCaster(merge_parts(list(parts))), np.random.default_rng(0)
     positions, normals, visible = choose_candidates(solid, caster, cameras, samples=20_000, count=42, rng=rng)
     return PointsRequest(
         subject=Subject("mug", solid, parts, False, tuple(views), tuple(cameras), seed=0),

@@ -19,7 +19,7 @@ from pydantic import BaseModel, create_model
 from tiny_engine import MODEL, MOST_PICTURES, TinyEngine
 
 from manitwin.config import BuildConfig, ServicesConfig, VlmConfig
-from manitwin.engine.charges import counted
+from manitwin.engine.charges import record_charges
 from manitwin.errors import BadReply, RateLimited, Unavailable
 from manitwin.models.vlm.chat_from_spec import anthropic_from_spec, openai_from_spec, replay_from_spec
 from manitwin.models.vlm.openai_chat import OpenAiChat
@@ -200,7 +200,7 @@ def test_second_time_the_cache_answers_without_a_request_or_a_charge(
     question, before, bills, replies = picture_question(2), engine.requests(), [], []
     for _ in range(2):
         chat = FROM_SPEC[protocol](f"{MODEL}@{url}", paid_config(tmp_path))
-        with counted() as bill:
+        with record_charges() as bill:
             replies.append(chat.ask(question))
         bills.append(bill.usd)
     assert engine.requests() - before == 1
@@ -222,7 +222,7 @@ def test_recorded_answers_are_replayed_without_the_engine(
     answers = [ask(chat, question, Judgement) for question in questions]
     before, record = engine.requests(), tmp_path / "answers.jsonl"
     replayed = replay_from_spec(str(record), BuildConfig())
-    with counted() as bill:
+    with record_charges() as bill:
         assert [ask(replayed, question, Judgement) for question in questions] == answers
     assert (engine.requests() - before, bill.usd) == (0, 0.0)
     assert replayed.model == MODEL

@@ -13,12 +13,12 @@ from drawn_episodes import recording, stored, write_run
 from drawn_scenes import write_scenes
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.web.episode_document import DOCUMENT
-from manitwin.web.serve import pages_of
+from manitwin.web.serve import application_for_place
 
 
 def get(place: Path, path: str, twins: str | None = None) -> tuple[int, bytes]:
     """Ask the pages of a place for a path; return the status and the body."""
-    messages = asked(pages_of(str(place), place.parent / "cache", twins), path)
+    messages = asked(application_for_place(str(place), place.parent / "cache", twins), path)
     return messages[0]["status"], b"".join(each.get("body", b"") for each in messages[1:])
 
 

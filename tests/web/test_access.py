@@ -9,7 +9,7 @@ import pytest
 from access_requests import Header, asked, header
 from starlette.types import Receive, Scope, Send
 
-from manitwin.web.access import HEADERS, PERSON, Guard, Names
+from manitwin.web.access import HEADERS, PERSON, Guard, ServerNames
 from manitwin.web.tokens import MOST_LINKS, Tokens
 
 PORT = 8765
@@ -37,7 +37,7 @@ class Server:
 
     def __init__(self, host: str = "127.0.0.1") -> None:
         self.pages, self.tokens, self.used = Pages(), Tokens(), 0
-        self.guard = Guard(self.pages, Names.of(host, PORT), self.tokens, self._used)
+        self.guard = Guard(self.pages, ServerNames.of(host, PORT), self.tokens, self._used)
         entered = asked(self.guard, f"/enter?token={self.tokens.link('anna')}", [HOST])
         self.cookie = ("cookie", "other=1; " + header(entered, "set-cookie").split(";")[0])
 
@@ -138,5 +138,5 @@ def test_beyond_this_machine_it_answers_to_addresses_and_to_no_other_name() -> N
     server = Server("0.0.0.0")
     assert server.status(server.cookie, ("host", f"192.168.0.7:{PORT}")) == 200
     assert server.status(server.cookie, ("host", f"evil.example:{PORT}")) == 403
-    named = Names.of("Workstation", PORT)
-    assert named.known(f"workstation:{PORT}") and not named.known(f"evil.example:{PORT}")
+    named = ServerNames.of("Workstation", PORT)
+    assert named.is_known_host(f"workstation:{PORT}") and not named.is_known_host(f"evil.example:{PORT}")

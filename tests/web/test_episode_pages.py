@@ -12,12 +12,12 @@ from asked_episodes import document, get, run_of, stored_ones
 from drawn_episodes import attempt, write_batch, write_run
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.web.episode_document import DOCUMENT
-from manitwin.web.episode_folders import is_episodes
-from manitwin.web.serve import pages_of
+from manitwin.web.episode_folders import has_episodes
+from manitwin.web.serve import application_for_place
 
 
 def test_the_list_has_every_attempt_with_its_reason_and_leads_to_the_recorded_ones(run: Path) -> None:
-    assert is_episodes(str(run)) and is_episodes(str(run / "maniskill" / "trajectory.h5"))
+    assert has_episodes(str(run)) and has_episodes(str(run / "maniskill" / "trajectory.h5"))
     status, page = get(run, "/")
     assert status == 200 and b"2 recorded episodes of 4 attempts" in page
     assert b"on_the_rim" in page and b"5 approach blocked" in page and b"move the can to the left" in page
@@ -48,7 +48,7 @@ def test_a_run_that_goes_on_shows_its_batches_and_a_broken_one_as_one_line(tmp_p
     first, second, third = stored_ones(tmp_path, 3)
     write_batch(tmp_path, [first, second], name="aabatch")
     place = write_batch(tmp_path, [third], name="bbbatch")
-    assert is_episodes(str(place)) and [document(place, number)["number"] for number in range(3)] == [0, 1, 2]
+    assert has_episodes(str(place)) and [document(place, number)["number"] for number in range(3)] == [0, 1, 2]
     (place / "batches" / "aa" / "aabatch" / "episodes.h5").write_bytes(b"no HDF5")
     page = get(place, "/")[1]
     assert b"2 recorded episodes" in page and page.count(b'class="error"') == 1
@@ -66,7 +66,7 @@ def test_one_file_is_shown_with_the_twins_that_are_named(tmp_path: Path) -> None
     told = document(file, twins=str(tmp_path / "set"))
     assert told["unreadable"] == [] and all(each["model"] for each in told["objects"])
     with pytest.raises(UsageError, match="--twins is for episodes"):
-        pages_of(str(tmp_path / "scenes"), tmp_path / "cache", str(tmp_path / "set"))
+        application_for_place(str(tmp_path / "scenes"), tmp_path / "cache", str(tmp_path / "set"))
 
 
 def test_words_of_an_episode_are_never_read_as_html(tmp_path: Path) -> None:
@@ -101,14 +101,14 @@ def test_a_file_that_leads_out_of_the_folder_is_not_followed(tmp_path: Path) -> 
     shutil.move(file, tmp_path / "elsewhere.h5")
     file.symlink_to(tmp_path / "elsewhere.h5")
     with pytest.raises(EpisodesError, match="leads out of the folder"):
-        pages_of(str(place), tmp_path / "cache")
+        application_for_place(str(place), tmp_path / "cache")
 
 
 def test_what_holds_no_episode_is_told(tmp_path: Path) -> None:
     (tmp_path / "batches").mkdir()
     with pytest.raises(UsageError, match="no recorded episode there"):
-        pages_of(str(tmp_path), tmp_path / "cache")
-    assert not is_episodes("s3://bucket/episodes") and not is_episodes(str(tmp_path / "nothing"))
+        application_for_place(str(tmp_path), tmp_path / "cache")
+    assert not has_episodes("s3://bucket/episodes") and not has_episodes(str(tmp_path / "nothing"))
     (tmp_path / "text.h5").write_text("text")
     with pytest.raises(EpisodesError, match="not a readable HDF5 file"):
-        pages_of(str(tmp_path / "text.h5"), tmp_path / "cache")
+        application_for_place(str(tmp_path / "text.h5"), tmp_path / "cache")

@@ -14,7 +14,7 @@ from served_view import serving
 
 from drawn_episodes import GRASPED, RELEASED, STEPS, attempt, stored, write_run
 from drawn_scenes import write_scenes
-from manitwin.web.plain_files import write_plain_files
+from manitwin.web.static_pages import write_static_pages
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser]
 
@@ -108,7 +108,7 @@ def test_words_of_an_episode_run_nothing(visitor: Callable[..., Any], run: Path)
 
 
 def test_plain_files_of_episodes_play_from_the_disk(visitor: Callable[..., Any], run: Path, tmp_path: Path) -> None:
-    write_plain_files(str(run), tmp_path / "out")
+    write_static_pages(str(run), tmp_path / "out")
     page = visitor()
     page.goto((tmp_path / "out" / "index.html").as_uri())
     page.get_by_role("link", name="episode-00000000").click()

@@ -14,8 +14,8 @@ import pytest
 from served_view import Served, serving
 
 from manitwin.twin.dataset_root import twin_name
-from manitwin.web.plain_files import write_plain_files
 from manitwin.web.serve import BETWEEN_LINKS_S
+from manitwin.web.static_pages import write_static_pages
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser]
 Visitor = Callable[..., Any]
@@ -224,7 +224,7 @@ def test_one_twin_is_shown_by_itself(visitor: Visitor, viewed: Viewed) -> None:
 
 
 def test_plain_files_open_from_the_disk(visitor: Visitor, viewed: Viewed, tmp_path: Path) -> None:
-    write_plain_files(str(viewed[0]), tmp_path / "out")
+    write_static_pages(str(viewed[0]), tmp_path / "out")
     page = visitor()
     page.goto((tmp_path / "out" / "index.html").as_uri())
     for words, count in (("a kettle.", 1), ("hold", 0), ("cm", 0), ("no such words", 0)):  # captions, and no headings

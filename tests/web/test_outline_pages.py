@@ -83,7 +83,7 @@ def test_outline_is_fitted_kept_and_shown_again(outlining: Starlette, outlines: 
     assert read_amendments(root, first) == amendments, "to fit keeps nothing"
     status, kept = kept_by(outlining, first, drawn)
     assert status == 200 and kept == {"next": f"/outline/{second}", "name": "bottle", "longest_side_cm": ""}
-    assert outlines.kept == (first,) and outlines.said == ()
+    assert outlines.outlined_keys == (first,) and outlines.restated_twins == ()
     said = read_amendments(root, first)[PhotoStage.name]
     assert set(said) == {DRAWN} and said[DRAWN]["source"] == "human:ada"
     found = drawn_outline(said, "first.jpg")
@@ -91,7 +91,7 @@ def test_outline_is_fitted_kept_and_shown_again(outlining: Starlette, outlines: 
     assert body(asked(outlining, f"/outline/{first}/mask.png")) == drawn
     assert "drawn, to be built" in body(asked(outlining, "/")).decode()
     assert kept_by(outlining, second, drawn)[1]["next"] == f"/outline/{bare}"
-    outlines.keep(bare, png(box_in((400, 300), 0.3, 0.7)))
+    outlines.store_outline(bare, png(box_in((400, 300), 0.3, 0.7)))
     assert kept_by(outlining, second, drawn)[1]["next"] == "/"
 
 
@@ -113,7 +113,7 @@ def test_what_is_no_outline_is_refused_and_nothing_is_kept(
     assert answer[0]["status"] == 400 and why in json.loads(body(answer))["error"]
     status, told = kept_by(outlining, first, sent)
     assert status == 400 and ("its JSON is broken" if len(sent) > MOST_BODY_BYTES else why) in told["error"]
-    assert outlines.kept == () and read_amendments(outlines.root, first) == {}
+    assert outlines.outlined_keys == () and read_amendments(outlines.root, first) == {}
 
 
 def test_empty_outlines_full_ones_and_those_of_two_things_are_not_kept(
@@ -129,13 +129,13 @@ def test_empty_outlines_full_ones_and_those_of_two_things_are_not_kept(
     ):
         status, told = kept_by(outlining, first, png(mask), name="jar")
         assert status == 400 and told["error"].startswith("not kept: ") and why in told["error"]
-    assert outlines.kept == outlines.said == () and read_amendments(outlines.root, first) == {}
+    assert outlines.outlined_keys == outlines.restated_twins == () and read_amendments(outlines.root, first) == {}
 
 
 def test_what_was_drawn_becomes_a_twin_that_says_so(outlines: OutlineSession, tmp_path: Path) -> None:
     first, second, bare = outlines.photos
     kept = outlines.mask(first)
-    outlines.keep(first, kept)
+    outlines.store_outline(first, kept)
     run = outlines.build(jobs=1, executor="inline")
     assert run.counts_of_given == {"accepted": 1}
     record = read_record(Path(str(outlines.root.local)) / outlines.root.twin_name(first))
@@ -161,7 +161,7 @@ def test_what_was_drawn_becomes_a_twin_that_says_so(outlines: OutlineSession, tm
 def test_cut_out_that_is_confirmed_takes_the_place_of_an_outline(outlines: OutlineSession) -> None:
     second = list(outlines.photos)[1]
     size_px = Image.open(io.BytesIO(outlines.picture(second))).size
-    outlines.keep(second, png(box_in(size_px, 0.3, 0.7)))
+    outlines.store_outline(second, png(box_in(size_px, 0.3, 0.7)))
     _, run = confirm(outlines.root, [second], "ben", jobs=1, executor="inline")
     assert run.counts_of_given == {"accepted": 1}
     assert set(read_amendments(outlines.root, second)[PhotoStage.name]) == {CONFIRMED}

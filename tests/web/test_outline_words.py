@@ -58,7 +58,7 @@ def test_name_and_size_are_kept_at_once_shown_again_and_taken_back(
     outlining: Starlette, outlines: OutlineSession
 ) -> None:
     first, second, _ = outlines.photos
-    assert said(outlining, first, "", "")[1]["name"] == "bottle" and outlines.said == (), (
+    assert said(outlining, first, "", "")[1]["name"] == "bottle" and outlines.restated_twins == (), (
         "nothing is taken back of what was given"
     )
     status, kept = said(outlining, first, " ketchup bottle ", "12,5")
@@ -66,7 +66,7 @@ def test_name_and_size_are_kept_at_once_shown_again_and_taken_back(
     amendments = read_amendments(outlines.root, first)
     assert amendments["photo"] == amendments["generate"] == {"name": {"value": "ketchup bottle", "source": "human:ada"}}
     assert amendments["mesh"]["longest_side_m"] == {"value": 0.125, "low": 0.125, "high": 0.125, "source": "human:ada"}
-    assert outlines.said == (first,) and outlines.kept == ()
+    assert outlines.restated_twins == (first,) and outlines.outlined_keys == ()
     page = page_of(outlining, f"/outline/{first}")
     assert 'value="ketchup bottle"' in page and 'value="12.5"' in page
     listed = page_of(outlining, "/")
@@ -102,7 +102,7 @@ def test_what_is_no_name_or_size_is_refused_and_nothing_is_kept(
     outline = base64.b64encode(outlines.mask(first)).decode()
     sent = {"png": outline, "name": name, "longest_side_cm": longest_side_cm}
     assert answer_to(outlining, f"/outline/{first}", sent)[0] == 400
-    assert outlines.said == outlines.kept == () and read_amendments(outlines.root, first) == {}
+    assert outlines.restated_twins == outlines.outlined_keys == () and read_amendments(outlines.root, first) == {}
 
 
 @pytest.mark.parametrize(
@@ -157,17 +157,17 @@ def test_outline_that_a_name_would_have_of_another_picture_is_not_kept(tmp_path:
     drawn.save(encoded, "PNG")
     refusal = r"not kept: as a 'mug' the picture is looked at without its frame"
     with pytest.raises(UsageError, match=refusal):
-        session.keep(key, encoded.getvalue(), "mug")
+        session.store_outline(key, encoded.getvalue(), "mug")
     assert read_amendments(session.root, key) == {}
-    session.keep(key, None, "mug")
+    session.store_outline(key, None, "mug")
     with pytest.raises(UsageError, match=refusal):
-        session.keep(key, encoded.getvalue())
-    session.keep(key, encoded.getvalue(), "book")
-    assert session.kept == (key,) and session.words(key).name == "book"
+        session.store_outline(key, encoded.getvalue())
+    session.store_outline(key, encoded.getvalue(), "book")
+    assert session.outlined_keys == (key,) and session.words(key).name == "book"
     with pytest.raises(UsageError, match=refusal):
-        session.keep(key, None, "mug")
+        session.store_outline(key, None, "mug")
     write_amendments(session.root, key, {})
-    session.keep(key, None, "mug")
+    session.store_outline(key, None, "mug")
     session.build(jobs=1, executor="inline")
     again = OutlineSession(session.root, "ada", [key])
     assert is_framed(again.picture(key))
@@ -187,7 +187,7 @@ def test_nameless_photo_that_is_named_is_built_as_one_that_was_given_the_name(tm
     session = OutlineSession(DatasetRoot(tmp_path / "twins"), "ada")
     [key] = session.photos
     assert session.words(key).name == ""
-    session.keep(key, session.mask(key), "bottle", "20")
+    session.store_outline(key, session.mask(key), "bottle", "20")
     assert session.build(jobs=1, executor="inline").counts_of_given == {"accepted": 1}
     record = record_of(session.root, nameless.twin_id)
     assert record.name == "bottle" and record.naming is None and record.language is not None
@@ -207,8 +207,8 @@ def test_nameless_photo_that_is_named_is_built_as_one_that_was_given_the_name(tm
     assert again.status == "accepted" and record_of(session.root, key).revision == record.revision
     later = OutlineSession(session.root, "ben", [key[:8]])
     assert vars(later.words(key)) == {"name": "bottle", "longest_side_cm": "20"}
-    later.keep(key, None, "ketchup bottle")
-    assert later.kept == () and later.build(jobs=1, executor="inline").counts_of_given == {"accepted": 1}
+    later.store_outline(key, None, "ketchup bottle")
+    assert later.outlined_keys == () and later.build(jobs=1, executor="inline").counts_of_given == {"accepted": 1}
     renamed = record_of(session.root, key)
     assert renamed.name == "ketchup bottle" and checks_of(renamed)["named"][1] == "human:ben says what it is"
     assert "human:ada drew its outline" in checks_of(renamed)["matte"][1]

@@ -66,13 +66,13 @@ def test_each_photo_is_shown_kept_by_its_place_and_built(root: DatasetRoot) -> N
     assert "front.png, photo 1 of 2: bottle" in listed and "side.png, photo 2 of 2: bottle" in listed
     assert f'href="/outline/{side}"' in listed and asked(app, f"/outline/{twin_id}")[0]["status"] == 404
     mask = session.mask(front)
-    session.keep(front, mask, "ketchup bottle")
-    assert session.kept == (front,) and session.words(side).name == "ketchup bottle"
+    session.store_outline(front, mask, "ketchup bottle")
+    assert session.outlined_keys == (front,) and session.words(side).name == "ketchup bottle"
     said = read_amendments(root, twin_id)[PhotoStage.name]
     assert set(said[DRAWN_OF_SEVERAL]) == {"0"} and said[DRAWN_OF_SEVERAL]["0"]["source"] == "human:ada"
     assert drawn_outline(said, "side.png", 1) is None and session.mask(front) == mask
 
-    session.keep(side, session.mask(side))
+    session.store_outline(side, session.mask(side))
     assert set(read_amendments(root, twin_id)[PhotoStage.name][DRAWN_OF_SEVERAL]) == {"0", "1"}
     assert session.build(jobs=1, executor="inline").counts_of_given == {"accepted": 1}
     record = record_of(root, twin_id)
@@ -92,14 +92,14 @@ def test_photo_that_was_left_out_alone_is_shown_again_on_request(root: DatasetRo
     session = OutlineSession(root, "ada")
     front, side = session.photos
     twin_id = session.photos[front].twin_id
-    session.keep(front, session.mask(front))
+    session.store_outline(front, session.mask(front))
     session.build(jobs=1, executor="inline")
     record = record_of(root, twin_id)
     assert record.status == "accepted" and "left out: side.png" in messages_of(record)["matte"]
     assert OutlineSession(root, "ben").photos == {}
     again = OutlineSession(root, "ben", [twin_id[:6]])
     assert list(again.photos) == [side]
-    again.keep(side, again.mask(side))
+    again.store_outline(side, again.mask(side))
     assert again.build(jobs=1, executor="inline").counts_of_given == {"accepted": 1}
     told = messages_of(record_of(root, twin_id))["matte"]
     assert "front.png: cut out as human:ada" in told and "side.png: cut out as human:ben" in told

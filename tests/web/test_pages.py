@@ -31,12 +31,12 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.web import served_files
 from manitwin.web.application import application
 from manitwin.web.gallery_page import gallery_page
-from manitwin.web.gallery_query import PAGE_CARDS, Found, Gallery, View
+from manitwin.web.gallery_query import PAGE_CARDS, Gallery, GalleryPage, View
 from manitwin.web.gripper_shapes import gripper_shape
 from manitwin.web.links import ServerLinks
 from manitwin.web.package_files import classic_script, package_file
-from manitwin.web.plain_files import write_plain_files
 from manitwin.web.served_files import TwinFolders
+from manitwin.web.static_pages import write_static_pages
 from manitwin.web.twin_document import document_bytes, twin_document
 
 Viewed = tuple[Path, list[str]]
@@ -111,7 +111,7 @@ def test_a_condition_that_cannot_be_used_is_still_in_its_field_and_so_are_the_ot
 @pytest.mark.parametrize("mass_min", [0.25, 0.1234567, 1234567.5, 1e-7])
 def test_an_address_written_from_a_view_reads_as_the_same_view(mass_min: float) -> None:
     view = View(q="a b&c", category="mug", mass_min=mass_min, where="mass_kg < 1", sort="-verified", page=3)
-    assert View.of(dict(parse_qsl(view.query()))) == view
+    assert View.from_url_fields(dict(parse_qsl(view.query()))) == view
     assert View().query() == "" and view.query(page=1).count("page") == 0
 
 
@@ -120,7 +120,7 @@ def test_pages_are_numbered_and_lead_to_each_other() -> None:
         ("twin_id", "revision", "name", "category", "material", "caption"), "x"
     ) | {"longest_m": 0.1, "mass_kg": 1.0, "simulated": None, "robustness_median": None}  # fmt: skip
     counts = {"accepted": 100_000, "rejected": 0}
-    found = Found(View(page=7, q="mug"), [row], 20 * PAGE_CARDS, counts, {"mug": 9}, {}, {})
+    found = GalleryPage(View(page=7, q="mug"), [row], 20 * PAGE_CARDS, counts, {"mug": 9}, {}, {})
     page = unescape(gallery_page(found, "set", ServerLinks()))
     numbers = re.findall(r'href="/\?q=mug(?:&page=(\d+))?"[^>]*>([\d,]+)<', page)
     assert numbers == [("", "1"), ("5", "5"), ("6", "6"), ("7", "7"), ("8", "8"), ("9", "9"), ("20", "20")]
@@ -288,7 +288,7 @@ def test_an_index_that_was_written_anew_is_read_anew(viewed: Viewed, tmp_path: P
 
 def test_plain_files_are_whole_and_the_same_again(viewed: Viewed, tmp_path: Path) -> None:
     root, (mug, kettle, can, rejected) = viewed
-    done = write_plain_files(str(root), tmp_path / "out", where="category <> 'kettle'")
+    done = write_static_pages(str(root), tmp_path / "out", where="category <> 'kettle'")
     assert (done.twins, done.left_out) == (2, {})
     index = (tmp_path / "out" / "index.html").read_text()
     assert mug in index and can in index and kettle not in index and rejected not in index
@@ -306,7 +306,7 @@ def test_plain_files_are_whole_and_the_same_again(viewed: Viewed, tmp_path: Path
     name, model = (folder / "visual.glb.js").read_text().split('"')[1::2]
     assert name == f"twins/{mug}/visual.glb" and "Play trial" not in (folder / "index.html").read_text()
     assert base64.b64decode(model) == (root / twin_name(mug) / "visual.glb").read_bytes()
-    write_plain_files(str(root), tmp_path / "again", where="category <> 'kettle'")
+    write_static_pages(str(root), tmp_path / "again", where="category <> 'kettle'")
     for path in (tmp_path / "out").rglob("*.*"):
         if path.is_file():
             assert path.read_bytes() == (tmp_path / "again" / path.relative_to(tmp_path / "out")).read_bytes()
@@ -315,7 +315,7 @@ def test_plain_files_are_whole_and_the_same_again(viewed: Viewed, tmp_path: Path
 def test_trials_of_plain_files_are_those_of_the_first_grasps(viewed: Viewed, tmp_path: Path) -> None:
     root, (_, kettle, _, _) = viewed
     for out in ("out", "again"):
-        write_plain_files(str(root / twin_name(kettle)), tmp_path / out, trials=2)
+        write_static_pages(str(root / twin_name(kettle)), tmp_path / out, trials=2)
     folder = tmp_path / "out" / "twins" / kettle
     scripts = (folder / "trials.js").read_text().splitlines()
     page = (folder / "index.html").read_text()
@@ -332,17 +332,17 @@ def test_plain_files_are_of_a_sample_and_leave_out_what_is_damaged(viewed: Viewe
     root = tmp_path / "set"
     shutil.copytree(viewed[0], root)
     (root / twin_name(viewed[1][0]) / "collision" / "hull_00.obj").write_text("v nonsense\n")
-    done = write_plain_files(str(root), tmp_path / "out")
+    done = write_static_pages(str(root), tmp_path / "out")
     assert done.twins == 2 and list(done.left_out) == [viewed[1][0]]
     model = root / twin_name(viewed[1][1]) / "visual.glb"
     model.write_bytes(model.read_bytes()[:-9])
-    done = write_plain_files(str(root), tmp_path / "cut")
+    done = write_static_pages(str(root), tmp_path / "cut")
     assert done.twins == 1 and "visual.glb: altered or cut off" in done.left_out[viewed[1][1]]
-    drawn = [write_plain_files(str(viewed[0]), tmp_path / f"s{n}", sample=1, seed=n % 2) for n in range(4)]
+    drawn = [write_static_pages(str(viewed[0]), tmp_path / f"s{n}", sample=1, seed=n % 2) for n in range(4)]
     assert {each.twins for each in drawn} == {1}
     kept = [sorted(path.name for path in (tmp_path / f"s{n}" / "twins").iterdir()) for n in range(4)]
     assert kept[:2] == kept[2:]
-    one = write_plain_files(str(viewed[0] / twin_name(viewed[1][1])), tmp_path / "one")
+    one = write_static_pages(str(viewed[0] / twin_name(viewed[1][1])), tmp_path / "one")
     assert one.twins == 1 and "kettle" in (tmp_path / "one" / "index.html").read_text()
     for place, where, said in (
         (root, "category = 'shoe'", "no accepted twin"),
@@ -351,7 +351,7 @@ def test_plain_files_are_of_a_sample_and_leave_out_what_is_damaged(viewed: Viewe
         (root / twin_name(viewed[1][1]), "mass_kg < 1", "is one twin"),
     ):
         with pytest.raises(UsageError, match=said):
-            write_plain_files(str(place), tmp_path / "none", where=where)
+            write_static_pages(str(place), tmp_path / "none", where=where)
     assert not (tmp_path / "none").exists()
 
 
@@ -364,7 +364,7 @@ def test_a_data_set_at_a_url_is_shown_from_copies(viewed: Viewed, tmp_path: Path
         assert len(names(get(app, "/")[1])) == 3
         assert get(app, f"/twin/{viewed[1][1]}")[0] == 200
         assert get(app, f"/twin/{viewed[1][1]}/card.png")[0] == 200 and get(app, "/twin/..")[0] == 404
-        done = write_plain_files(place, tmp_path / "out")
+        done = write_static_pages(place, tmp_path / "out")
         assert (done.twins, done.left_out) == (3, {})
     finally:
         fs.rm("/viewed", recursive=True)

@@ -11,7 +11,7 @@ import pytest
 from review_server import confirmed, correct_a_point, pick, press, reviewing, shown, stored
 
 from manitwin.twin.dataset_root import twin_name
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser]
 Visitor = Callable[..., Any]
@@ -156,7 +156,7 @@ def test_a_blind_review_has_the_photo_and_neither_intervals_nor_the_card(place: 
             (folder / "source.png").write_bytes((folder / "card.png").read_bytes())
             record["source"]["file"] = "source.png"
             del record["revision"], record["files"]
-            seal(folder, record)
+            write_twin_record(folder, record)
     with reviewing(place, "ada", more=("--blind",)) as server:
         page = visitor()
         page.goto(server.links["ada"])

@@ -18,10 +18,10 @@ from manitwin.robots.load import load_robot
 from manitwin.scenes.scene import SCENE
 from manitwin.scenes.scene_files import CONFIG, read_scene, scene_files, scene_name, write_scene
 from manitwin.twin.dataset_root import twin_name
-from manitwin.web.plain_files import write_plain_files
 from manitwin.web.scene_document import DOCUMENT
-from manitwin.web.scene_folders import SceneFolders, is_scenes
-from manitwin.web.serve import pages_of
+from manitwin.web.scene_folders import SceneFolders, has_scenes
+from manitwin.web.serve import application_for_place
+from manitwin.web.static_pages import write_static_pages
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def scenes(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def app(scenes: Path, tmp_path: Path) -> ASGIApp:
-    return pages_of(str(scenes), tmp_path / "cache")
+    return application_for_place(str(scenes), tmp_path / "cache")
 
 
 def get(app: ASGIApp, path: str) -> tuple[int, bytes]:
@@ -142,9 +142,9 @@ def test_a_page_that_is_not_there_is_the_first(app: ASGIApp, start: str) -> None
 
 def test_one_scene_is_shown_by_itself_and_what_is_no_scene_is_told(scenes: Path, tmp_path: Path) -> None:
     file = scene_files(scenes)[0]
-    assert is_scenes(str(scenes)) and is_scenes(str(file)) and is_scenes(str(file.parent))
-    assert not is_scenes(str(tmp_path)) and not is_scenes("s3://bucket/scenes")
-    alone = asked(pages_of(str(file.parent), tmp_path / "cache"), "/")
+    assert has_scenes(str(scenes)) and has_scenes(str(file)) and has_scenes(str(file.parent))
+    assert not has_scenes(str(tmp_path)) and not has_scenes("s3://bucket/scenes")
+    alone = asked(application_for_place(str(file.parent), tmp_path / "cache"), "/")
     assert alone[0]["status"] == 303 and header(alone, "location") == f"/scene/{file.parent.name}"
     with pytest.raises(UsageError, match="no scene there"):
         SceneFolders(str(tmp_path), tmp_path / "cache")
@@ -155,7 +155,7 @@ def test_one_scene_is_shown_by_itself_and_what_is_no_scene_is_told(scenes: Path,
 
 
 def test_plain_files_have_list_scenes_and_their_twins(scenes: Path, tmp_path: Path) -> None:
-    done = write_plain_files(str(scenes), tmp_path / "pages")
+    done = write_static_pages(str(scenes), tmp_path / "pages")
     pages = sorted((tmp_path / "pages" / "scenes").glob("*/index.html"))
     assert done.scenes == len(pages) > 1 and done.left_out == {} and done.twins >= 1
     assert (tmp_path / "pages" / "index.html").read_text().count('href="scenes/') == len(pages)
@@ -179,6 +179,6 @@ def test_plain_files_leave_out_a_scene_without_its_twins_and_no_page_leads_to_it
     stay = [each.scene_id for each in others if not gone & {thing.twin_id for thing in each.objects}]
     for twin_id in gone:
         shutil.rmtree(folders.twins.folder(twin_id))
-    done = write_plain_files(str(scenes), tmp_path / "pages")
+    done = write_static_pages(str(scenes), tmp_path / "pages")
     assert done.scenes == len(stay) and set(done.left_out) == set(folders.ids) - set(stay)
     assert first.scene_id not in "".join(path.read_text() for path in (tmp_path / "pages").rglob("*.html"))

@@ -14,7 +14,7 @@ from served_view import serving
 
 from drawn_scenes import write_scenes
 from manitwin.scenes.scene_files import scene_files
-from manitwin.web.plain_files import write_plain_files
+from manitwin.web.static_pages import write_static_pages
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser]
 
@@ -56,7 +56,7 @@ def test_a_scene_is_turned_pointed_at_and_handed_on(visitor: Callable[..., Any],
 
 
 def test_plain_files_of_scenes_open_from_the_disk_with_their_twins(visitor: Callable[..., Any], tmp_path: Path) -> None:
-    write_plain_files(str(write_scenes(tmp_path)), tmp_path / "out")
+    write_static_pages(str(write_scenes(tmp_path)), tmp_path / "out")
     page = visitor()
     page.goto((tmp_path / "out" / "index.html").as_uri())
     page.locator("tbody a").first.click()

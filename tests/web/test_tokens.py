@@ -10,7 +10,7 @@ import pytest
 from access_requests import asked, header
 
 from manitwin.errors import UsageError
-from manitwin.web.access import Guard, Names
+from manitwin.web.access import Guard, ServerNames
 from manitwin.web.serve import PageServer
 from manitwin.web.tokens import LASTING_S, MOST_LINKS, AccessFile, Tokens
 
@@ -54,7 +54,7 @@ def test_links_and_cookies_end_after_a_month_and_by_revoking(kept: AccessFile) -
     assert tokens.person(secret) is None and tokens.redeem(link) is None
     assert Tokens(kept, lambda: now).person(secret) is None
     fresh = tokens.redeem(tokens.link("ada")) or ""
-    Tokens(kept, lambda: now).forget()
+    Tokens(kept, lambda: now).revoke_all()
     assert Tokens(kept, lambda: now).person(fresh) is None
 
 
@@ -66,7 +66,7 @@ def test_every_one_of_many_annotators_has_a_link(kept: AccessFile) -> None:
 
 def test_without_a_file_nothing_is_written_and_the_cookie_ends_with_the_browser(tmp_path: Path) -> None:
     for tokens, lasting in ((Tokens(), False), (Tokens(AccessFile(tmp_path / "a.json")), True)):
-        guard = Guard(lambda *_: None, Names.of("127.0.0.1", 80), tokens)  # type: ignore[arg-type, return-value]
+        guard = Guard(lambda *_: None, ServerNames.of("127.0.0.1", 80), tokens)  # type: ignore[arg-type, return-value]
         answer = asked(guard, f"/enter?token={tokens.link('ada')}", [("host", "127.0.0.1")])
         assert ("Max-Age=2592000" in header(answer, "set-cookie")) == lasting
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]

@@ -11,7 +11,7 @@ from PIL import Image
 from grasped_twins import write_brick
 from manitwin.dataset.index.rebuild import rebuild
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from scene_twins import can, write_thing
 from twin_folders import write_rejected
 
@@ -34,7 +34,7 @@ def write_viewed(root: Path) -> list[str]:
         record["points"]["functional"][0]["description"] = caption
         record["name"] = caption if caption == HOSTILE else caption.split()[1].strip(".")
         del record["revision"], record["files"]
-        seal(folder, record)
+        write_twin_record(folder, record)
     made.append(write_rejected(root, 3))
     rebuild(DatasetRoot(root), jobs=1)
     return made

@@ -27,7 +27,7 @@ def write_index(
     is no data set, and TwinError if a process dies; the old index is then unchanged.
     """
     from manitwin.dataset.index.rebuild import rebuild
-    from manitwin.engine.machine_share import available_cores
+    from manitwin.engine.machine_resources import available_cores
     from manitwin.twin.dataset_root import DatasetRoot
 
     return rebuild(DatasetRoot(dataset), jobs=jobs or available_cores(), on_start=on_start, on_read=on_read)

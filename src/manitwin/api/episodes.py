@@ -80,7 +80,7 @@ def render_episodes(
     EpisodesError if there are no episodes, UsageError for an unknown camera, RendererMissing without a renderer, and
     Unavailable without a video encoder.
     """
-    from manitwin.episodes.episode_pictures import draw_episodes, write_with_pictures
+    from manitwin.episodes.episode_pictures import render_batches, write_with_pictures
     from manitwin.episodes.settings import PicturesConfig
     from manitwin.episodes.video import require_encoder
     from manitwin.render.device import require_renderer
@@ -89,7 +89,7 @@ def render_episodes(
     if run.get("executor") != "ray":
         require_renderer()
         require_encoder(settings.codec)
-    report = draw_episodes(Path(episodes), settings, twins=twins, **run)
+    report = render_batches(Path(episodes), settings, twins=twins, **run)
     if report.exit_code != 4:
         on_written(write_with_pictures(Path(episodes), settings.cameras, settings.rate_hz))
     return report

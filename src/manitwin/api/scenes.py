@@ -69,7 +69,7 @@ def export_scene(scene: Scene | str | Path, to: str | Iterable[str], out: str | 
     missing scene or twin, and ExportError if a format cannot represent the scene.
     """
     from manitwin.assets.writers.write import write_exported
-    from manitwin.errors import choose_from
+    from manitwin.errors import unknown_name_message
     from manitwin.scenes.layouts.export_mjcf import export_mjcf
     from manitwin.scenes.layouts.export_sdf import export_sdf
     from manitwin.scenes.layouts.export_usd import export_usd
@@ -79,7 +79,7 @@ def export_scene(scene: Scene | str | Path, to: str | Iterable[str], out: str | 
     names = list(exporters) if "all" in asked else asked
     for name in names:
         if name not in exporters:
-            raise UsageError(choose_from("format of a scene", name, exporters))
+            raise UsageError(unknown_name_message("format of a scene", name, exporters))
     loaded = load_scene(scene) if isinstance(scene, str | Path) else scene
     place = Path(out) / loaded.record.scene_id
     return {name: write_exported(exporters[name](loaded), place / name) for name in names}

@@ -73,7 +73,7 @@ def make_env(
     ``start_noise``, the seed of ``reset`` also perturbs the initial state. Raises UsageError for an unknown task or camera,
     another rate, or a scene that differs from the one that the task was made for.
     """
-    from manitwin.episodes.environment.make import make_env as make
+    from manitwin.episodes.environment.environment_factory import make_env as make
 
     return make(
         tasks,

@@ -34,7 +34,7 @@ class Articulation:
 
 
 @dataclass(frozen=True)
-class Node:
+class BodyNode:
     """One body in the tree of a file.
 
     ``holder`` is the index of the parent body in the node order, None for the root. ``shaped`` says whether the body has a
@@ -50,7 +50,7 @@ class Node:
 
 
 @dataclass(frozen=True)
-class Tree:
+class LinkTree:
     """The links and joints of a node tree.
 
     ``link_of (N,)`` is the link index of each node, ``heads`` the first node of each link, and ``remarks`` one line for each
@@ -63,7 +63,7 @@ class Tree:
     remarks: tuple[str, ...]
 
 
-def rigid_links(nodes: Sequence[Node]) -> Tree:
+def build_link_tree(nodes: Sequence[BodyNode]) -> LinkTree:
     """Merge nodes, parents first, into links: each link has a shape, and each but the first hangs from a joint that is kept.
 
     A joint that cannot be kept is locked in the pose of the file, with a remark. This applies to unsupported kinds, to joints
@@ -75,23 +75,25 @@ def rigid_links(nodes: Sequence[Node]) -> Tree:
     ]
     kept = {place for place, node in enumerate(nodes) if node.joint is not None}
     while True:
-        head_of = _heads(nodes, kept)
+        head_of = _first_nodes(nodes, kept)
         shaped = {head_of[place] for place, node in enumerate(nodes) if node.shaped}
         bare = sorted(set(head_of) - shaped)
         if not bare or not kept:
             break
         if bare[0]:
-            remarks.append(f"joint {_named(nodes, bare[0])} holds what has no shape: it is locked as the file stands")
+            remarks.append(
+                f"joint {_joint_name(nodes, bare[0])} holds what has no shape: it is locked as the file stands"
+            )
             kept.discard(bare[0])
             continue
         first = [place for place in sorted(kept) if head_of[nodes[place].holder or 0] == 0]
         how = "is left out" if len(first) == 1 else "is locked as the file stands"
-        remarks += [f"joint {_named(nodes, place)} hangs from what has no shape: it {how}" for place in first]
+        remarks += [f"joint {_joint_name(nodes, place)} hangs from what has no shape: it {how}" for place in first]
         kept -= set(first)
     if len(kept) >= MAX_LINKS:
         remarks.append(f"{len(kept)} joints were locked as the file stands: a twin has {MAX_LINKS} links at most")
         kept = set()
-    head_of = _heads(nodes, kept)
+    head_of = _first_nodes(nodes, kept)
     heads = (0, *sorted(kept))
     place_of = {head: place for place, head in enumerate(heads)}
     link_of = tuple(place_of[head] for head in head_of)
@@ -100,16 +102,16 @@ def rigid_links(nodes: Sequence[Node]) -> Tree:
         for head in heads[1:]
         if (joint := nodes[head].joint) is not None
     )
-    return Tree(link_of, heads, joints, tuple(remarks))
+    return LinkTree(link_of, heads, joints, tuple(remarks))
 
 
-def _heads(nodes: Sequence[Node], kept: set[int]) -> list[int]:
+def _first_nodes(nodes: Sequence[BodyNode], kept: set[int]) -> list[int]:
     heads: list[int] = []
     for place, node in enumerate(nodes):
         heads.append(place if place in kept or node.holder is None else heads[node.holder])
     return heads
 
 
-def _named(nodes: Sequence[Node], place: int) -> str:
+def _joint_name(nodes: Sequence[BodyNode], place: int) -> str:
     joint = nodes[place].joint
     return repr("" if joint is None else joint.name[:60])

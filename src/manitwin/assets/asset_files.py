@@ -36,7 +36,7 @@ class AssetFiles:
     """The files that an asset names, looked up only below ``root`` with symbolic links resolved.
 
     ``own`` is the folder of the asset; files read from above it cause a remark. ``used`` holds the files that were found,
-    ``missing`` the names that were not. ``remarks`` has one line each; ``lenient`` is the subset added by ``took_leniently``.
+    ``missing`` the names that were not. ``remarks`` has one line each; ``lenient`` is the subset added by ``remark_leniency``.
     ``partial`` is set when bodies were left out. ``limits`` apply to each mesh and say whether textures and normals are needed.
     """
 
@@ -59,14 +59,14 @@ class AssetFiles:
         if sentence not in self.remarks:
             self.remarks.append(sentence)
 
-    def took_leniently(self, sentence: str) -> None:
+    def remark_leniency(self, sentence: str) -> None:
         """Remark on something that is read here but that a strict loader would refuse or not find."""
         self.remark(sentence)
         if sentence not in self.lenient:
             self.lenient.append(sentence)
 
     @property
-    def lacks_a_mesh(self) -> bool:
+    def has_missing_mesh(self) -> bool:
         """Whether a missing file is a mesh."""
         return any(Path(name).suffix.lower() in MESHES for name in self.missing)
 
@@ -75,12 +75,12 @@ class AssetFiles:
         many.
         """
         self.partial = self.partial or bool(parts)
-        for sentence in of_left_out(parts, what):
+        for sentence in left_out_remarks(parts, what):
             self.remark(sentence)
 
     def remark_locked(self, joints: Sequence[str]) -> None:
         """Remark on movable joints that were locked in the pose of the file."""
-        for sentence in of_locked(joints):
+        for sentence in locked_joint_remarks(joints):
             self.remark(sentence)
 
     def find(self, name: str, candidates: Iterable[Path], below: str | None = None) -> Path | None:
@@ -94,23 +94,25 @@ class AssetFiles:
         tried: list[Path] = []
         for candidate in candidates:
             tried.append(candidate)
-            found, inside = self._below(candidate)
+            found, inside = self._resolve_below_root(candidate)
             if found is not None:
-                self._note_above(found)
+                self._remark_if_above(found)
                 self.used.add(found)
                 return found
             outside = candidate if outside is None and not inside else outside
         elsewhere = (
-            self._in_other_letters(name, tried) or self._in_renamed_root(name, tried) or self._elsewhere(below or name)
+            self._find_ignoring_case(name, tried)
+            or self._find_in_renamed_root(name, tried)
+            or self._find_elsewhere(below or name)
         )
         if elsewhere is not None:
             return elsewhere
         self.missing.append(_short(name))
         if outside is not None:
-            self.remark(f"{_short(name)}{OUTSIDE}{self._folder_of_both(outside)}")
+            self.remark(f"{_short(name)}{OUTSIDE}{self._common_folder_hint(outside)}")
         return None
 
-    def _folder_of_both(self, candidate: Path) -> str:
+    def _common_folder_hint(self, candidate: Path) -> str:
         """Describe where a file outside the root may be: in the common folder of both, unless that is a home folder or above
         it.
         """
@@ -120,7 +122,7 @@ class AssetFiles:
             return f", {root}; put it there, and its path into the asset's file"
         return f", {root}; where it is there, import with --root {both}"
 
-    def _below(self, candidate: Path) -> tuple[Path | None, bool]:
+    def _resolve_below_root(self, candidate: Path) -> tuple[Path | None, bool]:
         """Return the resolved file if it exists below the root, else None; and whether its path lies below the root."""
         try:
             resolved = candidate.resolve()
@@ -129,7 +131,7 @@ class AssetFiles:
         except (OSError, ValueError, RuntimeError):  # a name that no file system can hold; a loop of links
             return None, True
 
-    def _in_other_letters(self, name: str, tried: Sequence[Path]) -> Path | None:
+    def _find_ignoring_case(self, name: str, tried: Sequence[Path]) -> Path | None:
         """Return the file whose name differs only in letter case, with a remark; None if there is none."""
         if self._vain_searches >= _MOST_VAIN_SEARCHES:
             return None
@@ -142,10 +144,10 @@ class AssetFiles:
                 )
             except (OSError, ValueError, RuntimeError):  # as in _below
                 continue
-            found = self._below(alike[0])[0] if len(alike) == 1 else None
+            found = self._resolve_below_root(alike[0])[0] if len(alike) == 1 else None
             if found is not None:
                 if not any("the case of letters" in each for each in self.lenient):  # once, even if many meshes differ
-                    self.took_leniently(
+                    self.remark_leniency(
                         f"the case of letters in {_short(name)} is not that of the file {_short(found.name)}"
                     )
                 self.used.add(found)
@@ -153,20 +155,20 @@ class AssetFiles:
                 return found
         return None
 
-    def _elsewhere(self, name: str) -> Path | None:
+    def _find_elsewhere(self, name: str) -> Path | None:
         """Return a file that is elsewhere below the root than the asset says, with a remark; None if there is none."""
         if name in self._strayed:
             return self._strayed[name]
         if self.own is None or self._vain_searches >= _MOST_VAIN_SEARCHES:
             return None
         for candidate in with_the_path(name.replace("\\", "/"), self.own, self.root):
-            found, _ = self._below(candidate)
+            found, _ = self._resolve_below_root(candidate)
             if found is not None:
-                return self._stray(name, found)
+                return self._record_misplaced(name, found)
         self._vain_searches += 1
         return None
 
-    def _in_renamed_root(self, name: str, tried: Sequence[Path]) -> Path | None:
+    def _find_in_renamed_root(self, name: str, tried: Sequence[Path]) -> Path | None:
         """Return the file of a path that leaves the root and returns to it by its former name; None if there is none.
 
         The former name is one that no folder beside the root has: the root folder was renamed.
@@ -181,23 +183,23 @@ class AssetFiles:
                     continue
             except (OSError, ValueError, RuntimeError):  # as in _below
                 continue
-            found, _ = self._below(root.joinpath(*inside))
+            found, _ = self._resolve_below_root(root.joinpath(*inside))
             if found is not None:
-                return self._stray(name, found)
+                return self._record_misplaced(name, found)
         return None
 
-    def _stray(self, name: str, found: Path) -> Path:
+    def _record_misplaced(self, name: str, found: Path) -> Path:
         """Remark on a file that is elsewhere below the root than the asset says, and return it."""
         if not any("were read from elsewhere" in each for each in self.lenient):
             place = _short(str(found.relative_to(self.root.resolve())))
-            self.took_leniently(
+            self.remark_leniency(
                 f"files are not where it says, and were read from elsewhere below the root: {_short(name)} from {place}"
             )
         self.used.add(found)
         self._strayed[name] = found
         return found
 
-    def used_one(self, name: str, candidates: Iterable[Path]) -> Path | None:
+    def find_used(self, name: str, candidates: Iterable[Path]) -> Path | None:
         """Return the file that ``find`` returned for a name before, or None."""
         if name in self._strayed:
             return self._strayed[name]
@@ -210,14 +212,14 @@ class AssetFiles:
                 return resolved
         return None
 
-    def is_of_unread_format(self, path: Path) -> bool:
+    def is_unsupported(self, path: Path) -> bool:
         """Return whether a mesh has a format of ``UNREAD_FORMATS``; if so, add a remark."""
         unread = path.suffix.lower() in UNREAD_FORMATS
         if unread:
             self.remark(f"{path.name} is a {path.suffix.lower()} file, which is not read: its shape was left out")
         return unread
 
-    def _note_above(self, file: Path) -> None:
+    def _remark_if_above(self, file: Path) -> None:
         if self.own is not None and not file.is_relative_to(self.own.resolve()):
             self.remark(f"files were read from above its own folder, below the root {self.root.resolve().name!r}")
 
@@ -236,7 +238,7 @@ class AssetFiles:
                 raise AssetError(error.detail) from error
             self.used.update(mesh.files)
             for file in mesh.files:
-                self._note_above(file)
+                self._remark_if_above(file)
             for sentence in mesh.findings:
                 absent = _NOT_THERE.match(sentence)
                 if absent:
@@ -244,7 +246,7 @@ class AssetFiles:
                 if not (absent and absent.group(2) == "is not there"):
                     self.remark(f"{path.name}: {sentence}")
             self._meshes[path] = mesh
-        self.count(sum(len(part.faces) for part in self._meshes[path].parts))
+        self.count_shape(sum(len(part.faces) for part in self._meshes[path].parts))
         return self._meshes[path]
 
     def _texture_folders(self, mesh: Path) -> tuple[Path, ...]:
@@ -252,7 +254,7 @@ class AssetFiles:
         folders = (folder / "materials" / "textures" for folder in upward(mesh.parent, self.root))
         return tuple(folder for folder in folders if folder.is_dir())
 
-    def count(self, faces: int) -> None:
+    def count_shape(self, faces: int) -> None:
         """Count a shape with this many faces; raise AssetError where the asset exceeds ``MAX_SHAPES`` or ``MAX_FACES``."""
         self._shapes += 1
         self._faces += faces
@@ -270,14 +272,14 @@ class AssetFiles:
         return tuple(dict.fromkeys(self.missing))
 
 
-def of_left_out(parts: Sequence[str], what: str) -> list[str]:
+def left_out_remarks(parts: Sequence[str], what: str) -> list[str]:
     """Return the remarks on parts that were left out: one for each part, or one with their count where there are many."""
     if len(parts) > MOST_NAMED:
         return [f"{parts[0]}, and with it {len(parts) - 1} more {what} were left out: one rigid object is read"]
     return [f"{part} and was left out: one rigid object is read" for part in parts]
 
 
-def of_locked(joints: Sequence[str]) -> list[str]:
+def locked_joint_remarks(joints: Sequence[str]) -> list[str]:
     """Return the remark on movable joints that were locked in the pose of the file; an empty list if there are none."""
     if not joints:
         return []
@@ -286,7 +288,7 @@ def of_locked(joints: Sequence[str]) -> list[str]:
     return [f"joints were locked as the file stands, so that it is one rigid body: {named}{more}"]
 
 
-def joined(parts: Iterable[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:
+def concatenate_meshes(parts: Iterable[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:
     """Concatenate parts into one array of vertices ``(V, 3)`` and one of faces ``(F, 3)``."""
     parts = list(parts)
     vertices, faces = trimesh.util.append_faces([p.vertices for p in parts], [p.faces for p in parts])

@@ -33,7 +33,7 @@ def ellipsoid(radii_m: np.ndarray) -> trimesh.Trimesh:
     return mesh
 
 
-def unwrapped(solid: trimesh.Trimesh, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def unwrap_primitive(solid: trimesh.Trimesh, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices ``(V, 3)``, faces ``(F, 3)`` and texture coordinates ``(V, 2)``, origin at the lower left, of a
     primitive.
 

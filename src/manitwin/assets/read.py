@@ -10,9 +10,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from manitwin.assets.unread_formats import why_not_read
+from manitwin.assets.unsupported_formats import unsupported_reason
 from manitwin.assets.usd_texts import USD_SUFFIXES, USD_TEXT, layers_of
-from manitwin.errors import AssetError, choose_from
+from manitwin.errors import AssetError, unknown_name_message
 from manitwin.formats.bounded_file import open_regular
 
 if TYPE_CHECKING:
@@ -61,13 +61,13 @@ def detect(path: Path) -> Format:
 
     Raises AssetError if there is no asset, or a folder holds more than one.
     """
-    _require_there(path)
+    _require_existing(path)
     found = folder_format(path) if path.is_dir() else file_format(path)
     if found is not None:
         return found
     if path.is_dir():
         return detect(only_file(path))
-    raise AssetError(f"{path.name}: {why_not_read(path) or f'no asset of a known format; {VALID_ASSETS}'}")
+    raise AssetError(f"{path.name}: {unsupported_reason(path) or f'no asset of a known format; {VALID_ASSETS}'}")
 
 
 def folder_format(folder: Path) -> Format | None:
@@ -143,14 +143,14 @@ def _xml_format(file: Path) -> Format | None:
 
 
 @dataclass(frozen=True)
-class _Aside:
+class _NonAssets:
     """Collects descriptions that are not assets by themselves: fragments, templates, and layers of USD stages."""
 
     fragments: list[Path]
     templates: list[Path]
     layers: set[Path] = field(default_factory=set)
 
-    def takes(self, file: Path) -> bool:
+    def is_non_asset(self, file: Path) -> bool:
         """Return whether a description is not an asset by itself, and record it if so.
 
         This holds for a description without shapes, one with words in place of numbers, and a layer of another USD stage.
@@ -229,8 +229,8 @@ def read_asset(
     where it is costly, normals. The reader of a format and the engine it needs are imported only when used.
     """
     if format != "auto" and format not in FORMATS:
-        raise AssetError(choose_from("format", format, ("auto", *FORMATS)))
-    _require_there(path)
+        raise AssetError(unknown_name_message("format", format, ("auto", *FORMATS)))
+    _require_existing(path)
     chosen = detect(path) if format == "auto" else format
     reader = import_module(f"manitwin.assets.readers.{chosen}")
     if joints == "lock" and chosen not in WITH_JOINTS:
@@ -262,11 +262,11 @@ def find_assets(path: Path, fragments: list[Path] | None = None, templates: list
 
     Raises AssetError if the path does not exist.
     """
-    _require_there(path)
+    _require_existing(path)
     if not path.is_dir():
         yield path
         return
-    aside = _Aside([] if fragments is None else fragments, [] if templates is None else templates)
+    aside = _NonAssets([] if fragments is None else fragments, [] if templates is None else templates)
     yield from _assets_below(path, path, aside)
 
 
@@ -278,19 +278,19 @@ def is_file_below(file: Path, folder: Path) -> bool:
         return False
 
 
-def _require_there(path: Path) -> None:
+def _require_existing(path: Path) -> None:
     if not os.path.exists(path):
         raise AssetError(f"{path}: no such file or folder; check the path")
     if not path.is_file() and not path.is_dir():
         raise AssetError(f"{path}: is no regular file, and only such are read; give a file or a folder")
 
 
-def _assets_below(path: Path, root: Path, aside: _Aside) -> Iterator[Path]:
+def _assets_below(path: Path, root: Path, aside: _NonAssets) -> Iterator[Path]:
     form = folder_format(path)
     if form == "robotwin":
         yield from robotwin_data(path)
         return
-    if form == "sdf" and aside.takes(path / "model.sdf"):  # a light, for example
+    if form == "sdf" and aside.is_non_asset(path / "model.sdf"):  # a light, for example
         return
     if form is not None:
         yield path
@@ -303,7 +303,7 @@ def _assets_below(path: Path, root: Path, aside: _Aside) -> Iterator[Path]:
         file = Path(entry.path)
         if not is_file_below(file, root) or file_format(file) is None:
             continue
-        if not aside.takes(file):
+        if not aside.is_non_asset(file):
             yield file
     for entry in entries:
         if entry.is_dir(follow_symlinks=False):

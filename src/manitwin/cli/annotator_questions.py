@@ -27,7 +27,7 @@ from manitwin.models.vlm.prices import TokenPrice, estimated_usage
 from manitwin.models.vlm.protocol import Picture, Question, Reply, Turn
 from manitwin.pipeline.photo import PhotoStage
 from manitwin.pipeline.views import draw_views, write_webp
-from manitwin.render.raycast import merged, seen_tolerance_m, visible_points
+from manitwin.render.raycast import merge_parts, visibility_tolerance_m, visible_points
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.point_records import FunctionalPoint
@@ -38,7 +38,7 @@ where the clock of the wall runs on; the renderer maps 4 GiB of address space.
 """
 
 
-class SilentModel:
+class UnusedChatModel:
     """A chat model by name only: it is never asked."""
 
     name = "silent"
@@ -76,7 +76,7 @@ class AskedQuestions:
     remark: str = ""
 
 
-def questions_about(twin_folder: Path, config: BuildConfig, spec: str) -> AskedQuestions:
+def list_annotator_questions(twin_folder: Path, config: BuildConfig, spec: str) -> AskedQuestions:
     """Return what the model of ``spec`` would be asked about a finished twin, in order; nothing is sent.
 
     The last three are those that a photo or a text is asked about before there is a mesh. Raises TwinError for a folder that is
@@ -93,7 +93,7 @@ def questions_about(twin_folder: Path, config: BuildConfig, spec: str) -> AskedQ
     except (ProcessCrashed, MemoryError):
         limits = f"{LIMITS.seconds:g} s or {LIMITS.memory_bytes >> 30} GiB of memory"
         raise TwinError(f"{twin_folder}: the twin cannot be read within {limits}; build it again") from None
-    annotator = VlmAnnotator(SilentModel(model, price), config)
+    annotator = VlmAnnotator(UnusedChatModel(model, price), config)
     topics = {prompt: topic for topic, names in PROMPTS.items() for prompt in names}
     questions = tuple(
         AskedQuestion(
@@ -113,11 +113,13 @@ def read_questions(
 ) -> tuple[str, list[Question], str]:
     """Return a twin's id, the questions about it and a remark on them; to be called in a process with limits."""
     twin = Twin(twin_folder)
-    annotator = VlmAnnotator(SilentModel(model, price), config)
+    annotator = VlmAnnotator(UnusedChatModel(model, price), config)
     with tempfile.TemporaryDirectory() as folder:
         request = _request(twin, config, Path(folder))
         physical = twin.physical
-        asked = annotator.questions(request, physical.material, np.array(physical.extents_m), _chosen(twin, request))
+        asked = annotator.questions(
+            request, physical.material, np.array(physical.extents_m), _points_at_candidates(twin, request)
+        )
         more, remark = template_questions(twin, request.subject, config.vlm, annotator.prompts)
     return twin.record.twin_id, [*asked, *more], remark
 
@@ -132,11 +134,11 @@ def _request(twin: Twin, config: BuildConfig, folder: Path) -> PointsRequest:
     for index, picture in enumerate(pictures):
         views.append(folder / f"rgb_{index:02d}.webp")
         write_webp(picture, views[-1], config.views.webp_quality)
-    surface = merged(parts)
+    surface = merge_parts(parts)
     positions, normals = np.array(record.points.candidates.positions_m), np.array(record.points.candidates.normals)
     for row in record.points.candidates.refined:  # where they were when the views were marked
         positions[row.candidate], normals[row.candidate] = row.marked_position_m, row.marked_normal
-    caster, tolerance_m = RayCaster(surface), seen_tolerance_m(surface.extents)
+    caster, tolerance_m = RayCaster(surface), visibility_tolerance_m(surface.extents)
     seen = [visible_points(positions, normals, camera, caster, tolerance_m) for camera in cameras]
     subject = Subject(
         name=record.name,
@@ -161,7 +163,7 @@ def _request(twin: Twin, config: BuildConfig, folder: Path) -> PointsRequest:
     )
 
 
-def _chosen(twin: Twin, request: PointsRequest) -> list[FunctionalPoint]:
+def _points_at_candidates(twin: Twin, request: PointsRequest) -> list[FunctionalPoint]:
     """Return the functional points as they were chosen: at their candidates, before they moved to what they mean."""
     assert twin.record.points is not None
     return [point.model_copy(update=request.place(point.candidate)) for point in twin.record.points.functional]

@@ -10,7 +10,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from manitwin.cli.quick_start import import_quick_help
+from manitwin.cli.lazy_help import import_quick_help
 from manitwin.errors import UsageError
 
 PLACES = frozenset(
@@ -63,12 +63,14 @@ LONGEST_TEXT = 100_000
 """Characters: less than what Linux takes for one argument (``MAX_ARG_STRLEN``)."""
 
 
-def check_given_once(order: Iterable[Any]) -> None:
+def check_no_repeated_options(order: Iterable[Any]) -> None:
     """Raise UsageError for an option that takes one value and is given twice; ``order`` are the parameters as they were given."""
     times = Counter(each for each in order if each.param_type_name == "option" and not (each.multiple or each.is_flag))
     for option, count in times.items():
         if count > 1:
-            raise UsageError(f"{_called(option)}: given {count} times; this option takes one value, give it once")
+            raise UsageError(
+                f"{_parameter_label(option)}: given {count} times; this option takes one value, give it once"
+            )
 
 
 class CheckedCommand(TyperCommand):
@@ -80,12 +82,12 @@ class CheckedCommand(TyperCommand):
         Of two values of an option that takes one the parser would keep the last: half of what was asked for would be done.
         """
         given, _, order = self.make_parser(ctx).parse_args(args=list(args))
-        check_given_once(order)
+        check_no_repeated_options(order)
         for parameter in self.params:
             values = given.get(parameter.name or "")
             for value in values if isinstance(values, list | tuple) else [values]:
                 if isinstance(value, str):
-                    check_text(_called(parameter), value, place=parameter.name in PLACES)
+                    check_text(_parameter_label(parameter), value, place=parameter.name in PLACES)
         return super().parse_args(ctx, args)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -94,7 +96,7 @@ class CheckedCommand(TyperCommand):
         super().format_help(ctx, formatter)
 
 
-class CommandWords(TyperGroup):
+class MultiWordCommandGroup(TyperGroup):
     """A group of commands some of whose names are two words: ``review report`` is a command, and so is ``review``."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -126,7 +128,7 @@ def check_text(called: str, value: str, *, place: bool) -> None:
         raise UsageError(f"{called}: {value[:40]!r}... has {length} bytes; a path has at most {LONGEST_PLACE}")
 
 
-def degrees_of(value: str, photos: int) -> list[float]:
+def parse_azimuths_deg(value: str, photos: int) -> list[float]:
     """Return the degrees of a list with commas; one that ends in ``...`` goes on by its last step, up to one a photo.
 
     Raises UsageError for what are no degrees, and where no step can be told.
@@ -150,7 +152,7 @@ def degrees_of(value: str, photos: int) -> list[float]:
     return turns + [turns[-1] + step * number for number in range(1, photos - len(turns) + 1)]
 
 
-def _called(parameter: Any) -> str:
+def _parameter_label(parameter: Any) -> str:
     return str(parameter.opts[0] if parameter.param_type_name == "option" else parameter.metavar or parameter.name)
 
 

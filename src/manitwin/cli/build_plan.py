@@ -17,9 +17,9 @@ from manitwin.engine.ledger.ledger import LEDGER, Ledger
 from manitwin.engine.ledger.location import copy_ledger
 from manitwin.engine.recipe import Ending, Recipe
 from manitwin.errors import NewerVersion, TwinError
-from manitwin.pipeline.inspection import NotInspected, identified
+from manitwin.pipeline.inspection import NotInspected, inspect_identity
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.recipe import TwinRecipe, estimate_usd, made_otherwise
+from manitwin.pipeline.recipe import TwinRecipe, describe_differences, estimate_usd
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import RECORD, parse_record
 
@@ -92,16 +92,16 @@ def plan_build(items: Iterable[Item], root: DatasetRoot, config: BuildConfig, re
         ledger = Ledger(copy)
         try:
             given, _ = ledger.add_items(items)
-            own = {kind: own_rate(ledger, kind, recipe.sha256) for kind in usd}
+            own = {kind: dataset_rate(ledger, kind, recipe.sha256) for kind in usd}
             ledger.begin_run(recipe.sha256, given)  # reopens items that a run would do again
-            planned = _planned_by(ledger, _Planner(recipe, config, record_of, root))
+            planned = _plan_items(ledger, _Planner(recipe, config, record_of, root))
             rates = {kind: own[kind] or measured_rate(config, kind, _photos_each(planned, kind)) for kind in usd}
             return Plan(planned, rates, usd, remarks)
         finally:
             ledger.close()
 
 
-def _planned_by(ledger: Ledger, planner: _Planner) -> list[PlannedItem]:
+def _plan_items(ledger: Ledger, planner: _Planner) -> list[PlannedItem]:
     """Return a plan for each item: what has ended stays as the ledger has it, as in a run, and what is open is planned."""
     rows = ledger.connection.execute(
         "SELECT number, twin_id, kind, state, reason, detail FROM items ORDER BY number"
@@ -124,7 +124,7 @@ def _photos_each(items: Iterable[PlannedItem], kind: str) -> float:
     return max(1.0, fmean(counts)) if counts else 1.0
 
 
-def own_rate(ledger: Ledger, kind: str, recipe_sha256: str) -> Rate | None:
+def dataset_rate(ledger: Ledger, kind: str, recipe_sha256: str) -> Rate | None:
     """Return what accepted items of a kind took in this data set under the same recipe; None where they are too few."""
     number, total = ledger.connection.execute(
         "SELECT count(DISTINCT i.number), coalesce(sum(s.cpu_seconds), 0) FROM items i JOIN stages s ON s.number = i.number"
@@ -144,7 +144,7 @@ class _Planner:
         self.seen: set[str] = set()
 
     def plan(self, item: Item) -> PlannedItem:
-        found = identified(self._recipe, item, self._config.matting.frame)
+        found = inspect_identity(self._recipe, item, self._config.matting.frame)
         if isinstance(found, NotInspected):
             return PlannedItem(item, "", "", "would_be_rejected", str(found))
         identity, by_header = found
@@ -161,21 +161,21 @@ class _Planner:
         state: PlannedState = "to_build" if refused is None else "would_be_rejected"
         if refused is not None:
             return PlannedItem(item, twin_id, kind, state, str(refused))
-        return PlannedItem(item, twin_id, kind, state, "" if record is None else self._why_again(record))
+        return PlannedItem(item, twin_id, kind, state, "" if record is None else self._rebuild_reason(record))
 
     def _ending_of(self, record: bytes, twin_id: str) -> Ending | None:
         try:
-            return self._recipe.ending_of(record, self._amended(twin_id))
+            return self._recipe.ending_of(record, self._amendments_digest(twin_id))
         except NewerVersion as error:
             raise NewerVersion(f"{self._root.url}/{self._recipe.folder_of(twin_id)}/{error}") from error
 
-    def _why_again(self, record: bytes) -> str:
+    def _rebuild_reason(self, record: bytes) -> str:
         """Return why a twin that is there would be built again."""
         try:
-            otherwise = made_otherwise(parse_record(record), self._config)
+            otherwise = describe_differences(parse_record(record), self._config)
         except TwinError:
             return "the existing twin cannot be read"
         return f"the existing twin was made {otherwise or 'before its corrections by reviewers'}"
 
-    def _amended(self, twin_id: str) -> str | None:
+    def _amendments_digest(self, twin_id: str) -> str | None:
         return amendments_sha256(read_amendments(self._root, twin_id))

@@ -110,9 +110,9 @@ def group_causes(unaccepted: Iterable[Unaccepted]) -> list[Cause]:
     """
     found: dict[tuple[str, str], list[Unaccepted]] = {}
     for item in unaccepted:
-        told = _without_what_varies(item.message)
+        told = _normalize_message(item.message)
         if item.state == "rejected":
-            told = f"{item.reason or ''} {_of_size(item.message) or ''}"
+            told = f"{item.reason or ''} {_size_remedy(item.message) or ''}"
         found.setdefault((item.state, told), []).append(item)
     groups = sorted(found.values(), key=lambda items: -len(items))
     return [_cause(items[0], len(items)) for items in groups]
@@ -142,21 +142,21 @@ def _reason(cause: Cause) -> str:
 
 
 def _cause(first: Unaccepted, count: int) -> Cause:
-    message, remedy = without_prefixes(first.message), REMEDIES.get(first.reason or "")
-    if remedy is not None and (of_size := _of_size(first.message)) is not None:
+    message, remedy = strip_prefixes(first.message), REMEDIES.get(first.reason or "")
+    if remedy is not None and (of_size := _size_remedy(first.message)) is not None:
         remedy = of_size if of_size in (NAME_IT, AS_SCENERY) else f"{of_size}; else {remedy}"
     if first.reason:
         message = message.removeprefix(f"{first.reason}: ")
     if (first.reason == "unreadable" and _OF_PLACE.search(first.message)) or (
-        remedy is None and _is_own(first.message)
+        remedy is None and _is_manitwin_error(first.message)
     ):
-        message, remedy = _without_remedy(message)
+        message, remedy = _split_remedy(message)
     elif remedy is not None:
         message = message.removesuffix(f"; {remedy}")  # some messages end with the same words
     return Cause(first.state, first.reason, count, first.which, _shortened(message), remedy)
 
 
-def _of_size(message: str) -> str | None:
+def _size_remedy(message: str) -> str | None:
     """Return the remedy of a rejection that a size decided which is usual, unlikely, or no hand's; None where it is sound."""
     from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID
     from manitwin.pipeline.size_remarks import CHECK_SCALE, TRULY_LARGE
@@ -170,16 +170,16 @@ def _of_size(message: str) -> str | None:
     return NAME_IT if OF_ANYTHING in message else MEASURE_IT
 
 
-def without_prefixes(message: str) -> str:
+def strip_prefixes(message: str) -> str:
     """Return what was said without the stage and the attempts, the class of our own errors and the line of code."""
     return _LINE_OF_CODE.sub("", _OWN_ERROR.sub("", _TRIES.sub("", message)))
 
 
-def _is_own(message: str) -> bool:
+def _is_manitwin_error(message: str) -> bool:
     return _OWN_ERROR.match(_TRIES.sub("", message)) is not None
 
 
-def _without_remedy(message: str) -> tuple[str, str | None]:
+def _split_remedy(message: str) -> tuple[str, str | None]:
     """Split a message of our own errors, which ends with its remedy where it has one; a semicolon in quotes is none."""
     ends = [found.start() for found in _SEMICOLON.finditer(message) if found[0] == "; "]
     return (message[: ends[-1]], message[ends[-1] + 2 :]) if ends else (message, None)
@@ -189,8 +189,8 @@ def _shortened(message: str) -> str:
     return message if len(message) <= LONGEST_MESSAGE else f"{message[:LONGEST_MESSAGE]} ..."
 
 
-def _without_what_varies(message: str) -> str:
-    told = _shortened(without_prefixes(message))
+def _normalize_message(message: str) -> str:
+    told = _shortened(strip_prefixes(message))
     for pattern, stand_in in _VARIES:
         told = pattern.sub(stand_in, told)
     return told
@@ -202,11 +202,11 @@ def print_causes(place: str, numbers: Collection[int] = (), told: bool = False) 
     ``numbers`` are the items that are meant, none: all. ``told``: the first cause stands in the line above already.
     """
     again, others = f"manitwin retry {place} and the same command again", f"manitwin status {place}"
-    for line in cause_lines(causes_of(place, numbers), again=again, others=others)[1 if told else 0 :]:
+    for line in cause_lines(read_causes(place, numbers), again=again, others=others)[1 if told else 0 :]:
         print_error(line.strip() if told else line)
 
 
-def causes_of(place: str, numbers: Collection[int] = ()) -> list[Cause]:
+def read_causes(place: str, numbers: Collection[int] = ()) -> list[Cause]:
     """Return why items below a folder or URL were not accepted, the most frequent cause first; ``numbers`` empty: all items."""
     from manitwin.engine.ledger.location import local_ledger
     from manitwin.engine.ledger.progress import read_unaccepted

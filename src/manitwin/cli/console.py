@@ -28,7 +28,7 @@ SAID = logging.getLogger("manitwin.said")
 """What was printed; the log of a run has it, and ``--verbose`` does not print it again."""
 
 
-class _Printable:
+class _EscapedRenderable:
     """Something to print with every text in it as a terminal may show it; what Rich itself says to the terminal stays."""
 
     def __init__(self, renderable: ConsoleRenderable):
@@ -44,7 +44,7 @@ class _PrintableHook(RenderHook):
 
     def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
         """Return what is to be printed, escaped."""
-        return [_Printable(each) for each in renderables]
+        return [_EscapedRenderable(each) for each in renderables]
 
 
 class LoggedConsole(Console):
@@ -69,7 +69,7 @@ class LoggedConsole(Console):
         super().print(*objects, **options)
 
 
-def shown_text(text: str) -> Text:
+def escape_cell_text(text: str) -> Text:
     """Return text of outsiders for a table's cell or a progress line: one line, no markup, nothing to be obeyed."""
     return Text(printable_line(text))
 
@@ -89,7 +89,7 @@ err_console = LoggedConsole(logging.WARNING, stderr=True)
 error_console = LoggedConsole(logging.ERROR, stderr=True)
 
 
-class PrintedLog(logging.Handler):
+class ConsoleLogHandler(logging.Handler):
     """Print what the package logs: what ``--verbose`` adds."""
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -98,15 +98,15 @@ class PrintedLog(logging.Handler):
             err_console.print(self.format(record), style="dim", logged=False, paragraph=True)
 
 
-_printed_log = PrintedLog(logging.INFO)
+_printed_log = ConsoleLogHandler(logging.INFO)
 
 
-def be_quiet(quiet: bool) -> None:
+def set_quiet(quiet: bool) -> None:
     """Leave out all but errors, or no more."""
     out_console.quiet = err_console.quiet = quiet
 
 
-def be_verbose(verbose: bool) -> None:
+def set_verbose(verbose: bool) -> None:
     """Also print what the package logs, or no more."""
     PACKAGE.removeHandler(_printed_log)
     if verbose:
@@ -121,7 +121,7 @@ def print_estimate(usd_by_kind: dict[str, float]) -> None:
         err_console.print(f"approximate charges of services per twin: {each}")
 
 
-def note_old_layout(root: DatasetRoot) -> None:
+def print_layout_notice(root: DatasetRoot) -> None:
     """Say so where a data set is of the layout of earlier versions."""
     if root.flat:
         err_console.print(f"{root.url}: uses the flat layout of earlier versions, which can be read but not extended")

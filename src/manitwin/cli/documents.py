@@ -36,7 +36,7 @@ CommandLineError: type[Exception] = next(
 _wanted = False
 
 
-def _keep_stdout(wanted: bool) -> bool:
+def _set_json_output(wanted: bool) -> bool:
     """Send what is printed for a person to stderr, or no more."""
     global _wanted
     _wanted = out_console.stderr = wanted
@@ -46,14 +46,14 @@ def _keep_stdout(wanted: bool) -> bool:
 Json = Annotated[
     bool,
     typer.Option(
-        FLAG, callback=_keep_stdout, help="Print one JSON document on stdout; messages for people go to stderr."
+        FLAG, callback=_set_json_output, help="Print one JSON document on stdout; messages for people go to stderr."
     ),
 ]
 
 
-def begin_for_person() -> None:
+def reset_json_output() -> None:
     """Print for a person until ``--json`` is read: an earlier command of this process may have been asked for JSON."""
-    _keep_stdout(False)
+    _set_json_output(False)
 
 
 def print_document(document: Document) -> None:
@@ -66,12 +66,14 @@ def print_failure(error: BaseException, message: str, exit_status: int) -> None:
     print_document({"error": {"type": type(error).__name__, "message": message, "exit_status": exit_status}})
 
 
-def asked_for_json(error: BaseException) -> bool:
+def is_json_requested(error: BaseException) -> bool:
     """Return whether a command that ended with ``error`` was asked for JSON."""
-    return _wanted or (isinstance(error, CommandLineError) and _stands_in(sys.argv[1:], getattr(error, "ctx", None)))
+    return _wanted or (
+        isinstance(error, CommandLineError) and _has_json_flag(sys.argv[1:], getattr(error, "ctx", None))
+    )
 
 
-def _stands_in(arguments: list[str], context: typer.Context | None) -> bool:
+def _has_json_flag(arguments: list[str], context: typer.Context | None) -> bool:
     """Return whether the flag stands in a wrong command line, of which nothing may have been parsed: not as a value."""
     parameters = [] if context is None else [*context.command.params, *context.find_root().command.params]
     take_value = {
@@ -250,7 +252,7 @@ def _folder(listing: FolderListing) -> Document:
 
 def annotations_document(report: AnnotationReport) -> Document:
     """Return the scores of annotations: shares by dimension with their intervals, and every question."""
-    from manitwin.twin.shares import wilson_interval
+    from manitwin.twin.proportions import wilson_interval
 
     return {
         "twins": report.twins,

@@ -29,7 +29,7 @@ def print_plan(plan: Plan, place: str, *, as_json: bool) -> None:
         print_document(plan_document(plan, place))
         return
     for planned in plan.items[:MOST_LINES]:
-        out_console.print(_line_of(planned))
+        out_console.print(_item_line(planned))
     if len(plan.items) > MOST_LINES:
         out_console.print(f"... and {len(plan.items) - MOST_LINES} more (--json lists all)")
     counts: Counter[str] = Counter(planned.state for planned in plan.items)
@@ -45,14 +45,14 @@ def print_plan(plan: Plan, place: str, *, as_json: bool) -> None:
     out_console.print(f"services charge about {plan.cost_usd:.2f} USD")
 
 
-def _line_of(planned: PlannedItem) -> str:
+def _item_line(planned: PlannedItem) -> str:
     item = planned.item
-    given = _given(item, planned.kind)
+    given = _known_properties(item, planned.kind)
     detail = f": {planned.detail}" if planned.detail else ""
     return f"{WORDS[planned.state]:<17} {planned.kind or '?':<5} {item.title}{f' ({given})' if given else ''}{detail}"
 
 
-def _given(item: Item, kind: str | None) -> str:
+def _known_properties(item: Item, kind: str | None) -> str:
     units = f"units {item.units}" if kind == "mesh" else ""
     size = "" if item.longest_side_m is None else f"{item.longest_side_m:g} m"
     return ", ".join(filter(None, (item.name or "no name", size, units)))

@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import sys
 
-from manitwin.cli.interrupt import leave_before_teardown, leave_when_interrupted
-from manitwin.cli.machine_limits import USAGE_STATUS, too_little_memory
+from manitwin.cli.interrupt import exit_before_teardown, exit_on_interrupt
+from manitwin.cli.machine_limits import USAGE_STATUS, memory_limit_message
 
 
 def main() -> None:
     """Import the command line and run it; say so where there is too little memory to import it."""
-    leave_when_interrupted()
-    said = too_little_memory(sys.argv[1:])
+    exit_on_interrupt()
+    said = memory_limit_message(sys.argv[1:])
     if said is not None:
         os.write(2, f"{said}\n".encode(errors="backslashreplace"))
         sys.exit(USAGE_STATUS)
@@ -23,5 +23,5 @@ def main() -> None:
         run_command_line()
     except SystemExit as end:
         if interrupted() and isinstance(end.code, int):
-            leave_before_teardown(end.code)
+            exit_before_teardown(end.code)
         raise

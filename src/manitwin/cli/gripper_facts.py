@@ -46,10 +46,10 @@ def posture_facts(hand: MultiFingerGripper) -> list[PostureFacts]:
     from manitwin.robots.grippers.fingertip_gaps import Fingertips
 
     tips = Fingertips(hand)
-    return [_facts_of(tips, posture) for posture in hand.postures]
+    return [_posture_facts(tips, posture) for posture in hand.postures]
 
 
-def _facts_of(tips: Any, posture: Posture) -> PostureFacts:
+def _posture_facts(tips: Any, posture: Posture) -> PostureFacts:
     from manitwin.robots.grippers.posture_checks import opposition_tilt_rad, posture_gaps_m, posture_reach_m
 
     openings_m = np.linspace(max(0.0, posture.openings_m[0]), posture.openings_m[-1], SHOWN_ROWS)

@@ -61,7 +61,7 @@ def keep_exit_status() -> None:
     atexit.register(ignore)  # what is registered first is called last
 
 
-def leave_before_teardown(status: int) -> None:
+def exit_before_teardown(status: int) -> None:
     """End the process after its exit functions: taking modules down costs 0.5 CPU-s, and who interrupts waits for it."""
     _left_with[:] = [status]
 
@@ -76,13 +76,13 @@ def _flushed() -> bool:
     return True
 
 
-def leave_when_interrupted() -> None:
+def exit_on_interrupt() -> None:
     """End the process at a signal, while its imports are under way and there is nothing to end in order."""
     keep_exit_status()
     starting = Interrupts()
 
     def leave(number: int, frame: FrameType | None) -> NoReturn:
-        starting.say()
+        starting.print_message()
         os._exit(starting.status)
 
     for number in SIGNALS:
@@ -91,7 +91,7 @@ def leave_when_interrupted() -> None:
 
 
 @contextmanager
-def first_interrupt_calls(stop: Callable[[], None], numbers: tuple[signal.Signals, ...]) -> Iterator[None]:
+def call_on_first_interrupt(stop: Callable[[], None], numbers: tuple[signal.Signals, ...]) -> Iterator[None]:
     """Have the first of these signals call ``stop``, which ends a server in order; a second one ends what does not stop.
 
     Nothing is raised where the signal comes. While the context lasts no thread waits for the command's own handler
@@ -115,7 +115,7 @@ def first_interrupt_calls(stop: Callable[[], None], numbers: tuple[signal.Signal
 
 
 @contextmanager
-def until_interrupted(numbers: tuple[signal.Signals, ...]) -> Iterator[Callable[[], None]]:
+def wait_for_interrupt(numbers: tuple[signal.Signals, ...]) -> Iterator[Callable[[], None]]:
     """Yield what waits for the first of these signals, also where that has come already; a second one ends what does not stop.
 
     It reads a pipe that Python's handler in C writes to. A lock may be waited for for ever: a signal that comes just before is
@@ -129,7 +129,7 @@ def until_interrupted(numbers: tuple[signal.Signals, ...]) -> Iterator[Callable[
             pass
 
     try:
-        with first_interrupt_calls(lambda: None, numbers):
+        with call_on_first_interrupt(lambda: None, numbers):
             signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
             yield wait
     finally:
@@ -180,7 +180,7 @@ class Interrupts:
         self._watch()
         for number in SIGNALS:
             if signal.getsignal(number) is not signal.SIG_IGN:  # as a shell's background jobs have it
-                signal.signal(number, self._caught)
+                signal.signal(number, self._handle_signal)
 
     def _watch(self) -> None:
         """Have a thread end the process where the main thread does not answer a signal, or goes on after a second one.
@@ -198,7 +198,7 @@ class Interrupts:
             if not isinstance(lost.exc_value, KeyboardInterrupt):
                 print_unraisable(lost)
             elif not self._over:
-                self._ask_again()
+                self._request_resend()
 
         sys.unraisablehook = unraisable
         threading.Thread(target=self._wait_for_signals, args=(heard,), daemon=True, name=WATCH).start()
@@ -223,31 +223,31 @@ class Interrupts:
             if ends_at is not None and now >= ends_at:
                 ends_at = None
                 if (self._seen == 0 and not is_deferred()) or came > 1:
-                    self._leave_unless_over()
-            if asked_at is not None and not ready and not self._main_imports():
+                    self._exit_unless_finished()
+            if asked_at is not None and not ready and not self._is_main_thread_importing():
                 asked_at, own = None, own + 1
-                self._send_again()
+                self._resend_signal()
             elif asked_at is not None and now > asked_at + NATIVE_PATIENCE_S:
-                self._leave_unless_over()
+                self._exit_unless_finished()
 
-    def _ask_again(self) -> None:
+    def _request_resend(self) -> None:
         if self._tell is not None:
             os.write(self._tell, bytes((AGAIN,)))
 
-    def _send_again(self) -> None:
+    def _resend_signal(self) -> None:
         main = threading.main_thread().ident
         if main is not None and not self._over:
             self._sent_again = True
             signal.pthread_kill(main, signal.SIGINT)
 
-    def _leave_unless_over(self) -> None:
+    def _exit_unless_finished(self) -> None:
         if not self._over:
-            self._leave_at_once()
+            self._exit_immediately()
 
-    def _main_imports(self) -> bool:
-        return self._imports(sys._current_frames().get(threading.main_thread().ident or 0))
+    def _is_main_thread_importing(self) -> bool:
+        return self._is_importing(sys._current_frames().get(threading.main_thread().ident or 0))
 
-    def _imports(self, frame: FrameType | None) -> bool:
+    def _is_importing(self, frame: FrameType | None) -> bool:
         """Tell whether a module is imported in a frame, since the command began."""
         while frame is not None and frame.f_code is not self._begun_in:
             if frame.f_code.co_filename == IMPORT:
@@ -255,14 +255,14 @@ class Interrupts:
             frame = frame.f_back
         return False
 
-    def say(self) -> None:
+    def print_message(self) -> None:
         """Say once that the command was interrupted: straight to stderr, so that a second signal can do it anywhere."""
         if not self._said:
             self._said = True
             with suppress(OSError):
                 os.write(2, f"{self.message}\n".encode())
 
-    def ending(self, status: int) -> None:
+    def exit_on_next_signal(self, status: int) -> None:
         """From now on a signal ends the process with its status at once: what was to be done is done."""
 
         def leave(number: int, frame: FrameType | None) -> NoReturn:
@@ -272,20 +272,20 @@ class Interrupts:
         for number in SIGNALS:
             signal.signal(number, leave)
 
-    def _caught(self, number: int, frame: FrameType | None) -> None:
+    def _handle_signal(self, number: int, frame: FrameType | None) -> None:
         if self._sent_again:
             self._sent_again = False
         else:
             self._seen += 1
         if self._seen > 1:
-            self._leave_at_once()
-        if self._imports(frame):
-            self._ask_again()
+            self._exit_immediately()
+        if self._is_importing(frame):
+            self._request_resend()
         else:
             raise KeyboardInterrupt
 
-    def _leave_at_once(self) -> NoReturn:
-        self.say()
+    def _exit_immediately(self) -> NoReturn:
+        self.print_message()
         try:
             processes = sys.modules.get("multiprocessing.process")  # imported elsewhere, or there are none
             for child in processes.active_children() if processes is not None else ():

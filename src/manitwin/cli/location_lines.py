@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from manitwin.cli.console import out_console
 
 if TYPE_CHECKING:
-    from manitwin.scenes.locate.recognition import Thing
+    from manitwin.scenes.locate.recognition import ViewedObject
 
 
-def print_thing(thing: Thing, name: str, is_one_of_many: bool) -> None:
+def print_thing(thing: ViewedObject, name: str, is_one_of_many: bool) -> None:
     """Say where a thing is, or that it is not there."""
     location = thing.location
     if location.status == "none":

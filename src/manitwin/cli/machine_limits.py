@@ -34,7 +34,7 @@ _WRONG_PATHS = frozenset({
 })  # fmt: skip
 
 
-def too_little_memory(arguments: list[str]) -> str | None:
+def memory_limit_message(arguments: list[str]) -> str | None:
     """Return what is said where ``ulimit -v`` leaves a command less than its libraries map; None where there is enough."""
     command = next((each for each in arguments if not each.startswith("-")), "")
     if not command or command in WITHOUT_LIBRARIES or {"--help", "-h"} & set(arguments):
@@ -54,7 +54,7 @@ def too_little_memory(arguments: list[str]) -> str | None:
     )
 
 
-def of_machine(error: Exception) -> tuple[str, int] | None:
+def machine_error_message(error: Exception) -> tuple[str, int] | None:
     """Return the line and the exit status for what a disk, a limit or a path has to do with; None for anything else."""
     if isinstance(error, MemoryError):
         return f"out of memory; {_REMEDIES[errno.ENOMEM]}", RESUMABLE_STATUS

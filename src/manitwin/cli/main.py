@@ -17,8 +17,7 @@ import typer
 from typer.completion import completion_init, get_completion_script
 
 from manitwin.cli import options
-from manitwin.cli.arguments import CheckedCommand, CommandWords, register
-from manitwin.cli.choices import SHELLS
+from manitwin.cli.arguments import CheckedCommand, MultiWordCommandGroup, register
 from manitwin.cli.commands.affordances import affordances
 from manitwin.cli.commands.audit import audit
 from manitwin.cli.commands.build import build, run
@@ -55,17 +54,18 @@ from manitwin.cli.console import error_console, out_console, write_text
 from manitwin.cli.documents import (
     CommandLineError,
     Json,
-    asked_for_json,
-    begin_for_person,
+    is_json_requested,
     print_document,
     print_failure,
+    reset_json_output,
 )
 from manitwin.cli.interrupt import Interrupts
-from manitwin.cli.machine_limits import of_machine
-from manitwin.cli.quick_start import only_asked_for
-from manitwin.cli.reporting import LOG, Quiet, Verbose, reported, say_as_told
+from manitwin.cli.lazy_help import only_asked_for
+from manitwin.cli.machine_limits import machine_error_message
+from manitwin.cli.option_values import SHELLS
+from manitwin.cli.reporting import LOG, Quiet, Verbose, set_global_verbosity, with_reporting_options
 from manitwin.cli.run_log import end_log
-from manitwin.cli.terminal import guard_terminal
+from manitwin.cli.terminal import escape_terminal_output
 from manitwin.errors import BackendError, ManiTwinError, Unavailable
 from manitwin.formats.installation import import_remedy, installed_version, names_shared_library
 from manitwin.formats.printable import printable_line
@@ -82,7 +82,7 @@ LASTING_CAUSES = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM,
 
 _interrupts = Interrupts()
 app = typer.Typer(
-    cls=CommandWords,
+    cls=MultiWordCommandGroup,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["--help", "-h"]},
@@ -106,17 +106,17 @@ def _manitwin(
 ) -> None:
     """Turn photos, texts and meshes into data-generation-ready digital twins."""
     _interrupts.command = context.invoked_subcommand or ""
-    say_as_told(verbose, quiet)
+    set_global_verbosity(verbose, quiet)
     if context.invoked_subcommand is None:
         out_console.print(context.get_help(), paragraph=True)
 
 
 for watched in (build, layout, tasks, trajectories, render):
-    register(app, reported(watched, own_log=True))
-register(app, reported(run, own_log=True), "run", hidden=True)
+    register(app, with_reporting_options(watched, own_log=True))
+register(app, with_reporting_options(run, own_log=True), "run", hidden=True)
 for making in (index, stats, publish, export, segmentation, affordances, catalog, vqa):
-    register(app, reported(making))
-register(app, reported(import_), "import")
+    register(app, with_reporting_options(making))
+register(app, with_reporting_options(import_), "import")
 for other in (
     status, retry, check, query, search, plan, doctor, gripper, models, fake, prompts, audit, carve, evaluate, capture, locate,
     view,
@@ -143,7 +143,9 @@ for name, collecting in (
 
 @app.command(cls=CheckedCommand)
 def show(
-    twin: Annotated[Path, options.existing("A twin folder.", "TWIN", "a folder that manitwin build made")],
+    twin: Annotated[
+        Path, options.existing_path_argument("A twin folder.", "TWIN", "a folder that manitwin build made")
+    ],
     json_: Json = False,
 ) -> None:
     """Print a readable summary of a twin, after checking its files."""
@@ -175,17 +177,17 @@ def schema() -> None:
     write_text(json.dumps(record_schema(), indent=1) + "\n")
 
 
-def _told(error: Exception) -> tuple[int, str]:
+def _report_error(error: Exception) -> tuple[int, str]:
     """Tell who asked for JSON of an error, and return its exit status and the line that a person reads."""
     path = f"{PROGRAM} {_interrupts.command}".rstrip()
     if isinstance(error, CommandLineError):
         message = getattr(error, "format_message", error.__str__)()
         message = f"{_shown(message).removesuffix('.')}{'' if message.endswith('?') else '.'} See {path} --help"
     else:
-        message = _shown(_of_system(error) if isinstance(error, OSError) else str(error))
+        message = _shown(_os_error_message(error) if isinstance(error, OSError) else str(error))
     lasting = isinstance(error, OSError) and error.errno in LASTING_CAUSES
     status = 4 if lasting or isinstance(error, BackendError) else 2
-    if asked_for_json(error):
+    if is_json_requested(error):
         print_failure(error, message, status)
     return status, f"{path}: {message}"
 
@@ -194,7 +196,7 @@ def _shown(message: str) -> str:
     return printable_line(" ".join(message.split()), max_characters=LONGEST_LINE)
 
 
-def _of_system(error: OSError) -> str:
+def _os_error_message(error: OSError) -> str:
     """Return one line of what the system refused, which nothing below this border has told in words of its own."""
     named = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else "a file"
     remedy = "free disk space, and rerun the same command" if error.errno in LASTING_CAUSES else "check the path"
@@ -203,7 +205,7 @@ def _of_system(error: OSError) -> str:
 
 def _run() -> int:
     """Run what the command line says and return the exit status; every error is one line."""
-    begin_for_person()
+    reset_json_output()
     try:
         words = sys.argv[1:]
         asked = app if COMPLETION_VARIABLE in os.environ else only_asked_for(app, words)
@@ -213,18 +215,18 @@ def _run() -> int:
         return int(status or 0)
     except (KeyboardInterrupt, typer.Abort) as error:
         LOG.warning("interrupted")
-        if asked_for_json(error):
+        if is_json_requested(error):
             print_failure(error, _interrupts.message, _interrupts.status)
-        _interrupts.say()
+        _interrupts.print_message()
         return _interrupts.status
     except (CommandLineError, ManiTwinError) as error:
         LOG.debug("the error came from here", exc_info=error)
-        code, line = _told(error)
+        code, line = _report_error(error)
         error_console.print(line, style="red")
         return code
     except OSError as error:
         LOG.debug("the error came from here", exc_info=error)
-        code, line = _told(error)
+        code, line = _report_error(error)
         error_console.print(line, style="red")
         return code
     except ImportError as error:
@@ -232,17 +234,17 @@ def _run() -> int:
             LOG.exception("a defect in manitwin")
             raise
         LOG.debug("the error came from here", exc_info=error)
-        code, line = _told(Unavailable(f"{error}: {import_remedy(error, '')}"))
+        code, line = _report_error(Unavailable(f"{error}: {import_remedy(error, '')}"))
         error_console.print(line, style="red")
         return code
     except Exception as error:
-        found = of_machine(error)
+        found = machine_error_message(error)
         if found is None:
             LOG.exception("a defect in manitwin")
             raise
         LOG.error("the error came from here", exc_info=error)
         message, code = found
-        if asked_for_json(error):
+        if is_json_requested(error):
             print_failure(error, message, code)
         line = f"{PROGRAM} {_interrupts.command}".rstrip()
         error_console.print(f"{line}: {printable_line(message)}", markup=False, style="red")
@@ -254,17 +256,17 @@ def main() -> None:
     global _interrupts
     _interrupts = Interrupts()
     _interrupts.listen()
-    guard_terminal()
+    escape_terminal_output()
     if COMPLETION_VARIABLE in os.environ:
         completion_init()
     try:
         status = _run()
         LOG.info("ends with exit status %d", status)
-        _interrupts.ending(status)
+        _interrupts.exit_on_next_signal(status)
     except KeyboardInterrupt:  # as the first interrupt came while an error was said
-        _interrupts.say()
+        _interrupts.print_message()
         status = _interrupts.status
-        _interrupts.ending(status)
+        _interrupts.exit_on_next_signal(status)
     finally:
         end_log()
     sys.exit(status)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from manitwin.cli import choices
+from manitwin.cli import option_values
 
 if TYPE_CHECKING:
     from manitwin.config import Section
@@ -24,16 +24,16 @@ Text = Annotated[
     typer.Option("--text", help="An object to make from a description alone; may be repeated.", metavar="WORDS"),
 ]
 Units = Annotated[
-    str, choices.UNITS.option(help="Units of meshes, or of --poses: m, cm, mm, none (unknown scale) or auto.")
+    str, option_values.UNITS.option(help="Units of meshes, or of --poses: m, cm, mm, none (unknown scale) or auto.")
 ]
-Up = Annotated[str, choices.UP.option(help="Up axis of meshes, or of --poses: y, z or auto.")]
+Up = Annotated[str, option_values.UP.option(help="Up axis of meshes, or of --poses: y, z or auto.")]
 LongestSide = Annotated[
     float | None,
     typer.Option(
         "--longest-side",
         help="Longest of length, width and height of the object as it stands, in metres. Default for photos: the usual size.",
         metavar="METRES",
-        callback=choices.amount_of("--longest-side", choices.LARGEST_SIDE_M),
+        callback=option_values.amount_callback("--longest-side", option_values.LARGEST_SIDE_M),
     ),
 ]
 Mask = Annotated[
@@ -61,7 +61,7 @@ Jobs = Annotated[
         "--jobs",
         "-j",
         help="Number of processes; default: one per core, as memory allows.",
-        callback=choices.count_of("jobs", MOST_JOBS),
+        callback=option_values.count_callback("jobs", MOST_JOBS),
     ),
 ]
 Seed = Annotated[
@@ -70,48 +70,48 @@ Seed = Annotated[
 ]
 Executor = Annotated[
     str,
-    choices.EXECUTORS.option(
+    option_values.EXECUTORS.option(
         help="Where to run: local (processes), ray (a cluster) or inline (this process, for a debugger)."
     ),
 ]
 Address = Annotated[
     str | None, typer.Option(help="Address of the Ray cluster ('auto'); default: start one on this machine.")
 ]
-Config = Annotated[Path | None, typer.Option(help="A TOML file of settings.", callback=choices.settings_file)]
+Config = Annotated[Path | None, typer.Option(help="A TOML file of settings.", callback=option_values.settings_file)]
 Grippers = Annotated[
     list[str] | None,
-    choices.GRIPPERS.option(
+    option_values.GRIPPERS.option(
         "--gripper", help="Gripper to verify grasps for; may be repeated. The first is the main gripper of the twin."
     ),
 ]
 OwnGrippers = Annotated[
     list[str] | None,
-    choices.GRIPPERS.option(
+    option_values.GRIPPERS.option(
         "--gripper", help="File of a custom gripper that the twins were built with; may be repeated."
     ),
 ]
 Vlm = Annotated[
     str | None,
-    choices.ANNOTATORS.option(
+    option_values.ANNOTATORS.option(
         help="Annotator: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or rules (built in).", metavar="SPEC"
     ),
 ]
 Generator = Annotated[
     str | None,
-    choices.GENERATORS.option(
+    option_values.GENERATORS.option(
         help="Mesh generator: rodin, tripo, meshy, hunyuan3d@URL, fal:ENDPOINT, 'command:...', or lift (built in).",
         metavar="SPEC",
     ),
 ]
 Grasper = Annotated[
     str | None,
-    choices.GRASPERS.option(
+    option_values.GRASPERS.option(
         help="Grasp proposer: graspgen@tcp://HOST:PORT, graspgenx@..., or antipodal (built in).", metavar="SPEC"
     ),
 ]
 Matting = Annotated[
     str | None,
-    choices.MATTING.option(
+    option_values.MATTING.option(
         help="Matting networks: isnet, u2net (manitwin models add), a .onnx file, two separated by a comma; or none.",
         metavar="NETWORKS",
     ),
@@ -121,7 +121,7 @@ MaxCost = Annotated[
     typer.Option(
         "--max-cost",
         help="Limit on the total charges of services in USD; the run then stops and can be resumed.",
-        callback=choices.amount_of("--max-cost", choices.LARGEST_COST_USD),
+        callback=option_values.amount_callback("--max-cost", option_values.LARGEST_COST_USD),
     ),
 ]
 RequireAgreement = Annotated[
@@ -129,7 +129,7 @@ RequireAgreement = Annotated[
 ]
 SecondOpinion = Annotated[
     str | None,
-    choices.SECOND_OPINIONS.option(
+    option_values.SECOND_OPINIONS.option(
         "--second-opinion", help="Grasps that the second engine tries: all that held, or a sample of 20."
     ),
 ]
@@ -207,19 +207,19 @@ RUN: dict[str, tuple[Any, Any]] = {
 Settings = TypeVar("Settings", bound="Section")
 
 
-def existing(help: str, metavar: str, remedy: str) -> Any:
+def existing_path_argument(help: str, metavar: str, remedy: str) -> Any:
     """Return the argument of places that must be there; ``remedy`` says what to give."""
-    return typer.Argument(help=help, metavar=metavar, callback=choices.must_exist(remedy))
+    return typer.Argument(help=help, metavar=metavar, callback=option_values.existing_path_callback(remedy))
 
 
 def output_folder(help: str) -> Any:
     """Return the option ``--out`` of a folder that can be written."""
-    return typer.Option("--out", "-o", help=help, callback=choices.folder_to_write)
+    return typer.Option("--out", "-o", help=help, callback=option_values.check_output_folder)
 
 
 def new_folder(help: str) -> Any:
     """Return the option ``--out`` of a folder that can be written and is empty or not there: asked before any work."""
-    return typer.Option("--out", "-o", help=help, callback=choices.new_folder_to_write)
+    return typer.Option("--out", "-o", help=help, callback=option_values.check_new_folder)
 
 
 def with_options(
@@ -263,6 +263,6 @@ def read_settings(kind: type[Settings], run: dict[str, Any], given: dict[str, An
     return load_settings(kind, run["config"], {**own, **given})
 
 
-def placed(run: dict[str, Any]) -> dict[str, Any]:
+def executor_settings(run: dict[str, Any]) -> dict[str, Any]:
     """Return where the options ``RUN`` say that a run is: its executor and address."""
     return {"executor": run["executor"], "address": run["address"]}

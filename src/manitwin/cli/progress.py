@@ -16,8 +16,8 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
-from manitwin.cli.console import err_console, out_console, shown_text
-from manitwin.cli.run_log import log_into
+from manitwin.cli.console import err_console, escape_cell_text, out_console
+from manitwin.cli.run_log import open_run_log
 from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageEvent, StageStarted
 from manitwin.engine.ledger.location import local_log
 from manitwin.engine.stage import StagePart
@@ -67,7 +67,7 @@ class RunProgress:
         return self.before + self.counts.total()
 
     @property
-    def parts_done(self) -> float:
+    def fractional_done(self) -> float:
         """The number of items that are done in parts: two at a half are one."""
         with self._lock:
             return sum(part.done / part.total for part in self._parts.values() if part.total)
@@ -89,7 +89,7 @@ class RunProgress:
             elif isinstance(event, StageEnded):
                 self._forget(event.task.payload)
 
-    def ended(self, payload: Payload, state: str, found: bool = False) -> None:
+    def record_ended(self, payload: Payload, state: str, found: bool = False) -> None:
         """Note what became of an item; one that was ``found`` finished says nothing of how long others take."""
         with self._lock:
             self._forget(payload)
@@ -99,14 +99,14 @@ class RunProgress:
 
     def item_ended(self, event: ItemEnded) -> None:
         """Note the event of an engine's run."""
-        self.ended(event.task.payload, event.state, event.found)
+        self.record_ended(event.task.payload, event.state, event.found)
 
-    def left_s(self) -> float | None:
+    def remaining_s(self) -> float | None:
         """Return about how many seconds are left at the rate until now; None until three items were worked on.
 
         A tenth of an item is enough where items say what part of them is done.
         """
-        parts = self.parts_done
+        parts = self.fractional_done
         worked = self.counts.total() - self._found + parts
         if self._started_at is None or worked < (ENOUGH_OF_PARTS if parts else ENOUGH):
             return None
@@ -134,7 +134,7 @@ class RunProgress:
         with self._lock:
             counts = ", ".join(f"{number} {state}" for state, number in self.counts.items())
             stages = self._stages()
-        left_s = self.left_s()
+        left_s = self.remaining_s()
         left = f"about {duration(left_s)} left" if left_s is not None and self.done < self.total else ""
         parts = (f"{self.done} of {self.total} {self.what}", left, counts, stages)
         return "; ".join(filter(None, parts))
@@ -148,7 +148,7 @@ def duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
 
-class ShownWaits:
+class WaitNotices:
     """Prints which stages wait and why: each at once, and from time to time how long a service that is down is still asked."""
 
     def __init__(self, err: Console, clock: Callable[[], float] = time.monotonic):
@@ -225,8 +225,8 @@ class ShownProgress:
         table.add_column(no_wrap=True, overflow="ellipsis")
         total = self.progress.total or None
         table.add_row(
-            ProgressBar(total, self.progress.done + self.progress.parts_done, width=BAR_WIDTH),
-            shown_text(self.progress.line()),
+            ProgressBar(total, self.progress.done + self.progress.fractional_done, width=BAR_WIDTH),
+            escape_cell_text(self.progress.line()),
         )
         return table
 
@@ -236,7 +236,7 @@ class ShownProgress:
             self._err.print(f"{now} {self.progress.line()}", markup=False)
 
 
-class WatchedRun(ShownProgress):
+class RunDisplay(ShownProgress):
     """The progress of a run below ``place`` on the consoles of this command; its log lies there unless ``--log`` says otherwise.
 
     ``what`` names the items in the plural; ``preparing`` says how far the run is that has not begun.
@@ -245,7 +245,7 @@ class WatchedRun(ShownProgress):
     def __init__(self, what: str, place: str | Path, preparing: Callable[[], str] = lambda: ""):
         super().__init__(RunProgress(what, preparing=preparing), out_console, err_console)
         self._place = place
-        self._waits = ShownWaits(err_console)
+        self._waits = WaitNotices(err_console)
 
     @property
     def callbacks(self) -> RunOptions:
@@ -259,6 +259,6 @@ class WatchedRun(ShownProgress):
 
     def start(self, total: int, opened: int) -> None:
         """Begin a run, and its log: what was refused before leaves none behind."""
-        log_into(local_log(DatasetRoot(self._place)))
+        open_run_log(local_log(DatasetRoot(self._place)))
         self.progress.start(total, opened)
         out_console.print(f"{counted(total, self.progress.what)}, {opened:,} to do", markup=False)

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from manitwin.cli.console import be_quiet, be_verbose
+from manitwin.cli.console import set_quiet, set_verbose
 from manitwin.cli.options import with_options
 from manitwin.cli.run_log import begin_log
 from manitwin.errors import UsageError
@@ -31,24 +31,24 @@ LOG = logging.getLogger("manitwin.command")
 _before_command = (False, False)
 
 
-def say_as_told(verbose: bool, quiet: bool) -> None:
-    """Take what stands before a command's name; ``reported`` adds what stands behind it."""
+def set_global_verbosity(verbose: bool, quiet: bool) -> None:
+    """Take what stands before a command's name; ``with_reporting_options`` adds what stands behind it."""
     global _before_command
     _before_command = (verbose, quiet)
-    _say(verbose, quiet)
+    _set_verbosity(verbose, quiet)
 
 
-def _say(verbose: bool, quiet: bool) -> None:
+def _set_verbosity(verbose: bool, quiet: bool) -> None:
     if verbose and quiet:
         raise UsageError("--verbose and --quiet contradict each other; give one of them")
-    be_quiet(quiet)
-    be_verbose(verbose)
+    set_quiet(quiet)
+    set_verbose(verbose)
 
 
-def reported(command: Callable[..., None], own_log: bool = False) -> Callable[..., None]:
+def with_reporting_options(command: Callable[..., None], own_log: bool = False) -> Callable[..., None]:
     """Return a command that takes ``--verbose``, ``--quiet`` and ``--log`` as well.
 
-    ``own_log``: it has a place for its log (``log_into``); of another command nothing is kept without ``--log``.
+    ``own_log``: it has a place for its log (``open_run_log``); of another command nothing is kept without ``--log``.
     """
 
     @with_options(OPTIONS)
@@ -56,12 +56,12 @@ def reported(command: Callable[..., None], own_log: bool = False) -> Callable[..
     def call(*, verbose: bool, quiet: bool, log: Path | None, **given: Any) -> None:
         global _before_command
         before, _before_command = _before_command, (False, False)
-        _say(verbose or before[0], quiet or before[1])
+        _set_verbosity(verbose or before[0], quiet or before[1])
         try:
             begin_log(log, place_follows=own_log)
             LOG.info("manitwin %s: %s", installed_version(), " ".join(sys.argv[1:]))
             command(**given)
         finally:
-            _say(False, False)  # a process may run more commands than one
+            _set_verbosity(False, False)  # a process may run more commands than one
 
     return call

@@ -19,7 +19,7 @@ CREDENTIALS_IN_URL = re.compile(r"(?<=://)[^/@\s]+@")
 HIDDEN = "***"
 
 
-class WithoutSecrets(logging.Formatter):
+class RedactingFormatter(logging.Formatter):
     """Lines with their time in UTC, in which no key of the environment stands, nor a URL's user and password.
 
     Nothing in them is obeyed by a terminal that shows the file, and what follows in a record of several lines is indented: no
@@ -54,7 +54,7 @@ class RunLog(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__(logging.DEBUG)
-        self.setFormatter(WithoutSecrets())
+        self.setFormatter(RedactingFormatter())
         self._kept: list[logging.LogRecord] = []
         self._file: logging.FileHandler | None = None
 
@@ -95,7 +95,7 @@ _log: RunLog | None = None
 
 
 def begin_log(path: Path | None, place_follows: bool = False) -> None:
-    """Keep a log from now on: at ``path``, or where ``log_into`` will say if that ``place_follows``, else none.
+    """Keep a log from now on: at ``path``, or where ``open_run_log`` will say if that ``place_follows``, else none.
 
     Raises UsageError.
     """
@@ -110,7 +110,7 @@ def begin_log(path: Path | None, place_follows: bool = False) -> None:
         _log.open(path)
 
 
-def log_into(path: Path) -> None:
+def open_run_log(path: Path) -> None:
     """Append the log to a file, where a log is kept and ``--log`` has not named another one."""
     if _log is not None:
         _log.open(path)

@@ -49,7 +49,7 @@ def summarize_grasps(records: Iterable[TwinRecord]) -> GraspTotals:
     grasps = [record.grasps for record in records if record.grasps is not None]
     opinions = [g.second_opinion for g in grasps if g.second_opinion is not None]
     robustness = [g.robustness.robust for g in grasps if g.robustness is not None]
-    by_type = _added(g.failure_table.by_grasp_type for g in grasps)
+    by_type = _sum_tables(g.failure_table.by_grasp_type for g in grasps)
     return GraspTotals(
         twins=len(grasps),
         simulated=sum(g.simulated for g in grasps),
@@ -58,7 +58,7 @@ def summarize_grasps(records: Iterable[TwinRecord]) -> GraspTotals:
         unfiltered_held=sum(_unfiltered_held(g) for g in grasps),
         outcomes=dict(sorted(sum((Counter(row) for row in by_type.values()), Counter()).items())),
         by_grasp_type=by_type,
-        by_region=_added(g.failure_table.by_region for g in grasps),
+        by_region=_sum_tables(g.failure_table.by_region for g in grasps),
         robust=sum(robustness) if robustness else None,
         second_opinion=_add_opinions(opinions) if opinions else None,
     )
@@ -112,7 +112,7 @@ def _unfiltered_held(grasps: GraspSummary) -> int:
     return round((grasps.unfiltered_success_rate or 0.0) * grasps.unfiltered_simulated)
 
 
-def _added(tables: Iterable[dict[str, dict[str, int]]]) -> dict[str, dict[str, int]]:
+def _sum_tables(tables: Iterable[dict[str, dict[str, int]]]) -> dict[str, dict[str, int]]:
     total: dict[str, Counter[str]] = {}
     for table in tables:
         for name, row in table.items():

@@ -6,15 +6,15 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from manitwin.cli.console import shown_text
+from manitwin.cli.console import escape_cell_text
 from manitwin.pipeline.quality import rehearsed_words
 from manitwin.twin.grasp_summary import GraspSummary, OtherGripper, SecondOpinion
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.point_records import FunctionalPoint
+from manitwin.twin.proportions import wilson_interval
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.record_values import Estimate
 from manitwin.twin.resting import RestingPose, resting_poses
-from manitwin.twin.shares import wilson_interval
 
 
 def estimate_text(estimate: Estimate, unit: str = "") -> str:
@@ -33,7 +33,7 @@ def print_summary(twin: Twin, console: Console) -> None:
         console.print(f"{record.rejection.stage}: {record.rejection.reason}: {record.rejection.detail}", markup=False)
     table = Table(show_header=False, box=None, pad_edge=False)
     for name, value in _rows(record):
-        table.add_row(shown_text(name), shown_text(value))  # words of a model
+        table.add_row(escape_cell_text(name), escape_cell_text(value))  # words of a model
     console.print(table)
     failed = [check for check in record.quality.checks if check.passed is not True]
     for check in failed:
@@ -104,7 +104,10 @@ def _grasp_rows(grasps: GraspSummary) -> list[tuple[str, str]]:
         ("failures", failures),
     ]
     table = grasps.failure_table
-    rows += [(f"held by {name}", _held(row)) for name, row in (*table.by_grasp_type.items(), *table.by_region.items())]
+    rows += [
+        (f"held by {name}", _outcome_text(row))
+        for name, row in (*table.by_grasp_type.items(), *table.by_region.items())
+    ]
     if grasps.robustness is not None:
         again = grasps.robustness
         share = f"{100 * again.robust_share:.0f} %"
@@ -117,7 +120,7 @@ def _grasp_rows(grasps: GraspSummary) -> list[tuple[str, str]]:
     return rows
 
 
-def _held(outcomes: dict[str, int]) -> str:
+def _outcome_text(outcomes: dict[str, int]) -> str:
     others = ", ".join(f"{number} {outcome}" for outcome, number in outcomes.items() if outcome != "held")
     return f"{outcomes.get('held', 0)} of {sum(outcomes.values())}" + (f" ({others})" if others else "")
 

@@ -10,14 +10,14 @@ from PIL import Image
 from manitwin.config import VlmConfig
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.vlm.prompt_files import Prompt
-from manitwin.models.annotators.vlm.template_choice import Shown, choice_question
+from manitwin.models.annotators.vlm.template_choice import TemplateInput, choice_question
 from manitwin.models.annotators.vlm.template_likeness import FIRST_LOOK, likeness_question
 from manitwin.models.annotators.vlm.template_measures import measures_question
 from manitwin.models.annotators.vlm.view_pictures import read_picture
-from manitwin.models.generators.lift.rounds import pictures_of
+from manitwin.models.generators.lift.review_rounds import render_review_pictures
 from manitwin.models.generators.templates.fitting.fit import template_for
 from manitwin.models.vlm.protocol import Question
-from manitwin.render.grounds import shown_object
+from manitwin.render.background_colors import foreground_mask
 from manitwin.twin.loaded_twin import Twin
 
 
@@ -33,13 +33,13 @@ def template_questions(
     prompt = twin.record.source.prompt
     if subject.photos:
         with Image.open(subject.photos[0]) as photo:
-            shown = Shown(np.asarray(photo.convert("RGBA")), None, subject.name)
+            shown = TemplateInput(np.asarray(photo.convert("RGBA")), None, subject.name)
     elif prompt is not None:
-        shown = Shown(None, prompt, subject.name)
+        shown = TemplateInput(None, prompt, subject.name)
     else:
         view = read_picture(subject.views[0])
-        alpha = np.where(shown_object(view), 255, 0).astype(np.uint8)
-        shown = Shown(np.dstack([view, alpha]), None, subject.name)
+        alpha = np.where(foreground_mask(view), 255, 0).astype(np.uint8)
+        shown = TemplateInput(np.dstack([view, alpha]), None, subject.name)
         remarks.append("This twin was not made from a photo: one of its views takes the place of the photo.")
     asked = [choice_question(shown, prompts["template"], settings.picture_px)]
     template = template_for(subject.name) or template_for(subject.known_as)
@@ -48,7 +48,7 @@ def template_questions(
         return asked, " ".join(remarks)
     remarks.append("The model in the last one is the twin itself; its measures are the template's usual ones.")
     measures = {name: measure.typical for name, measure in template.measures.items()}
-    pictures = pictures_of(subject.parts, -90.0, 20.0, settings.picture_px)
+    pictures = render_review_pictures(subject.parts, -90.0, 20.0, settings.picture_px)
     asked.append(measures_question(shown, template.category, prompts["template_measures"], settings.picture_px))
     asked.append(
         likeness_question(

@@ -20,7 +20,7 @@ class _PrintableFormatter(logging.Formatter):
         return printable(super().format(record))
 
 
-def guard_terminal() -> None:
+def escape_terminal_output() -> None:
     """Escape what Python itself prints, and write what the terminal's encoding lacks as escapes instead of failing."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

@@ -27,7 +27,7 @@ class ViewFiles:
 
     def with_captured(self, folder: Path) -> ViewFiles:
         """Return these files, and of a captured folder those that are not given; raises UsageError beside a cloud."""
-        from manitwin.scenes.locate.captured import capture_files
+        from manitwin.scenes.locate.capture_folder import capture_files
 
         if self.cloud is not None:
             raise UsageError("--cloud: cannot be combined with --view; leave out --view")

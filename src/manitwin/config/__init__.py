@@ -6,7 +6,7 @@ A section is part of the key of its stage: changing a value re-runs that stage a
 from manitwin.config.build import BuildConfig
 from manitwin.config.grasps import GraspConfig, RobustnessConfig, SecondOpinionConfig, VerifyConfig
 from manitwin.config.inputs import GenerateConfig, MattingConfig, NamingConfig, SourceConfig
-from manitwin.config.load import load_config, read_toml, validated
+from manitwin.config.load import load_config, read_toml, validate_settings
 from manitwin.config.run import MOST_SLOTS, Resource, RunConfig
 from manitwin.config.section import LARGEST_COUNT, LARGEST_SEED, NO_SETTINGS, Section, Seed
 from manitwin.config.services import ServicesConfig, VlmConfig
@@ -43,5 +43,5 @@ __all__ = [
     "VlmConfig",
     "load_config",
     "read_toml",
-    "validated",
+    "validate_settings",
 ]

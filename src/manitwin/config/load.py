@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 
 from manitwin.config.build import BuildConfig
 from manitwin.config.section import LARGEST_SEED
-from manitwin.errors import ConfigError, choose_from
+from manitwin.errors import ConfigError, unknown_name_message
 from manitwin.formats import toml_file
 from manitwin.formats.printable import printable_line
 
@@ -32,7 +32,7 @@ def load_config(path: str | Path, kind: Any = BuildConfig) -> Any:
 
     Raises ConfigError, which names the invalid key, the nearest valid one and all valid ones.
     """
-    return validated(kind, read_toml(Path(path)), str(path))
+    return validate_settings(kind, read_toml(Path(path)), str(path))
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -42,7 +42,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     return toml_file.read_toml(path, ConfigError, name=str(path))
 
 
-def validated(kind: type[Kind], data: dict[str, Any], where: str) -> Kind:
+def validate_settings(kind: type[Kind], data: dict[str, Any], where: str) -> Kind:
     """Return validated settings of one kind. Raises ConfigError like ``load_config``; ``where`` names the source in its
     message.
     """
@@ -70,4 +70,4 @@ def _explain(error: ErrorDetails, kind: type[BaseModel]) -> str:
     section = kind
     for part in map(str, error["loc"][:-1]):
         section = cast(type[BaseModel], section.model_fields[part].annotation)
-    return f"{'.'.join(where)}: {choose_from('setting', where[-1], section.model_fields)}"
+    return f"{'.'.join(where)}: {unknown_name_message('setting', where[-1], section.model_fields)}"

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from functools import partial
 
 from manitwin.engine.ledger.ledger import Ledger
-from manitwin.engine.machine_share import available_cores
-from manitwin.engine.stage_runner import RESULT, is_whole
+from manitwin.engine.machine_resources import available_cores
+from manitwin.engine.stage_runner import RESULT, is_complete_result
 from manitwin.errors import NewerVersion, TwinError, UsageError
 from manitwin.formats.printable import printable_line
 from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.integrity import find_damage, find_foreign_files
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.store import RECORD, REMEDY, WORK, parse_record
-from manitwin.twin.wholeness import damage, foreign_files
 
 INDEX = "index"
 _FOLDER = re.compile(r"[0-9A-Za-z_-][0-9A-Za-z_.-]*")
@@ -42,16 +42,16 @@ def disagreements(
 
     Files of finished twins are compared by size, with ``digests`` also by content. ``keeps_work`` also checks the stage results.
     """
-    yield from _interrupted(ledger)
-    yield from _ended_without_folder(ledger, root, digests)
-    yield from _folders_nobody_ended(ledger, root)
-    yield from _half_folders(root)
+    yield from _interrupted_items(ledger)
+    yield from _missing_folders(ledger, root, digests)
+    yield from _unrecorded_folders(ledger, root)
+    yield from _partial_folders(root)
     if keeps_work:
-        yield from _done_without_result(ledger, root, digests)
-    yield from _index(ledger, root)
+        yield from _missing_stage_results(ledger, root, digests)
+    yield from _index_disagreements(ledger, root)
 
 
-def _interrupted(ledger: Ledger) -> Iterator[Disagreement]:
+def _interrupted_items(ledger: Ledger) -> Iterator[Disagreement]:
     (count,) = ledger.connection.execute("SELECT count(*) FROM stages WHERE state = 'running'").fetchone()
     if count:
         yield Disagreement(
@@ -60,7 +60,7 @@ def _interrupted(ledger: Ledger) -> Iterator[Disagreement]:
         )
 
 
-def _ended_without_folder(ledger: Ledger, root: DatasetRoot, digests: bool) -> Iterator[Disagreement]:
+def _missing_folders(ledger: Ledger, root: DatasetRoot, digests: bool) -> Iterator[Disagreement]:
     rows = ledger.connection.execute(
         "SELECT number, twin_id, state, revision FROM items WHERE state IN ('accepted', 'rejected') ORDER BY number"
     ).fetchall()
@@ -70,7 +70,7 @@ def _ended_without_folder(ledger: Ledger, root: DatasetRoot, digests: bool) -> I
             yield Disagreement(f"{called}: not the name of a twin", partial(_reopen, ledger, number))
             continue
         try:
-            record = _read(root, twin_id)
+            record = _read_verified_record(root, twin_id)
         except FileNotFoundError:
             wrong: str | None = f"{state} in the ledger, but its folder is missing"
         except NewerVersion as error:
@@ -79,17 +79,17 @@ def _ended_without_folder(ledger: Ledger, root: DatasetRoot, digests: bool) -> I
         except TwinError as error:
             wrong = str(error)
         else:
-            wrong = _what_is_wrong(root, record, state, revision, digests)
-            foreign = foreign_files(root, root.twin_name(twin_id), record)
+            wrong = _find_damage(root, record, state, revision, digests)
+            foreign = find_foreign_files(root, root.twin_name(twin_id), record)
             if foreign and not wrong:
                 yield Disagreement(
                     f"{called}: its folder contains {foreign}, which does not belong to it; remove it", None
                 )
         if wrong:
-            yield Disagreement(f"{called}: {wrong}", partial(_redo, ledger, root, number, twin_id))
+            yield Disagreement(f"{called}: {wrong}", partial(_discard_twin, ledger, root, number, twin_id))
 
 
-def _read(root: DatasetRoot, twin_id: str) -> TwinRecord:
+def _read_verified_record(root: DatasetRoot, twin_id: str) -> TwinRecord:
     """Return a twin's record after checking its revision; raises FileNotFoundError and TwinError."""
     name = f"{root.twin_name(twin_id)}/{RECORD}"
     record = parse_record(root.read_bytes(name), name, sealed=True)
@@ -98,12 +98,12 @@ def _read(root: DatasetRoot, twin_id: str) -> TwinRecord:
     return record
 
 
-def _what_is_wrong(root: DatasetRoot, record: TwinRecord, state: str, revision: str, digests: bool) -> str | None:
+def _find_damage(root: DatasetRoot, record: TwinRecord, state: str, revision: str, digests: bool) -> str | None:
     if record.status != state:
         return f"{state} in the ledger, but {record.status} in its folder"
     if record.revision != revision:
         return "its folder has another revision than the ledger"
-    return damage(root, root.twin_name(record.twin_id), record, digests=digests)
+    return find_damage(root, root.twin_name(record.twin_id), record, digests=digests)
 
 
 def damaged_twins(root: DatasetRoot, *, digests: bool = False) -> Iterator[str]:
@@ -111,19 +111,19 @@ def damaged_twins(root: DatasetRoot, *, digests: bool = False) -> Iterator[str]:
     for twin_id in root.twin_ids():
         folder = root.twin_name(twin_id)
         try:
-            record = _read(root, twin_id)
+            record = _read_verified_record(root, twin_id)
         except TwinError as error:
             yield str(error)
             continue
-        wrong = damage(root, folder, record, digests=digests)
-        foreign = foreign_files(root, folder, record)
+        wrong = find_damage(root, folder, record, digests=digests)
+        foreign = find_foreign_files(root, folder, record)
         if wrong:
             yield f"twin {twin_id}: {wrong}; remove {folder} and build its input again"
         elif foreign:
             yield f"twin {twin_id}: its folder contains {foreign}, which does not belong to it; remove it"
 
 
-def _folders_nobody_ended(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
+def _unrecorded_folders(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
     for twin_id in root.twin_ids():
         row = ledger.connection.execute(
             "SELECT number, state FROM items WHERE twin_id = ? AND state <> 'duplicate'", (twin_id,)
@@ -138,7 +138,7 @@ def _folders_nobody_ended(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagre
                 )
 
 
-def _half_folders(root: DatasetRoot) -> Iterator[Disagreement]:
+def _partial_folders(root: DatasetRoot) -> Iterator[Disagreement]:
     if root.local is None:
         return
     work = root.local / WORK
@@ -152,7 +152,7 @@ def _half_folders(root: DatasetRoot) -> Iterator[Disagreement]:
             yield Disagreement(f"{name}: a twin's folder without {RECORD}", partial(root.remove, name))
 
 
-def _done_without_result(ledger: Ledger, root: DatasetRoot, digests: bool) -> Iterator[Disagreement]:
+def _missing_stage_results(ledger: Ledger, root: DatasetRoot, digests: bool) -> Iterator[Disagreement]:
     """Yield the stage results that are marked as done but are damaged or missing.
 
     If an item has ended and its whole folder of results is gone, nothing is reported: a user may delete it to free disk space,
@@ -175,11 +175,11 @@ def _done_without_result(ledger: Ledger, root: DatasetRoot, digests: bool) -> It
             continue
         yield Disagreement(
             f"item {number}, stage {stage}: done in the ledger, but its result is missing",
-            partial(_undo, ledger, root, number, stage, name),
+            partial(_discard_stage_result, ledger, root, number, stage, name),
         )
 
 
-def _index(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
+def _index_disagreements(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
     from manitwin.dataset.index.parts import indexed_twins  # the import takes a second
 
     try:
@@ -210,14 +210,14 @@ def _index(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
 
 def _is_result(root: DatasetRoot, name: str, digests: bool) -> bool:
     if root.local is not None:
-        return is_whole(root.local / name, digests=digests)
+        return is_complete_result(root.local / name, digests=digests)
     try:
         return bool(root.exists(f"{name}/{RESULT}") and root.read_json(f"{name}/{RESULT}"))
     except TwinError:
         return False
 
 
-def _undo(ledger: Ledger, root: DatasetRoot, number: int, stage: str, name: str) -> None:
+def _discard_stage_result(ledger: Ledger, root: DatasetRoot, number: int, stage: str, name: str) -> None:
     """Delete a stage's result and its ledger row, so that the stage runs again when the item is rebuilt."""
     root.remove(name)
     _execute(ledger, "DELETE FROM stages WHERE number = ? AND stage = ?", [(number, stage)])
@@ -229,10 +229,10 @@ def _reindex(ledger: Ledger, root: DatasetRoot) -> None:
     if next(root.twin_ids(), None) is None:
         root.remove(INDEX)
         return
-    ledger.indexed(indexed_again(root))
+    ledger.mark_indexed(rebuild_index(root))
 
 
-def indexed_again(root: DatasetRoot) -> set[str]:
+def rebuild_index(root: DatasetRoot) -> set[str]:
     """Rewrite the index from the folders and return the ids of the twins in it."""
     from manitwin.dataset.index.parts import indexed_twins
     from manitwin.dataset.index.rebuild import rebuild
@@ -242,7 +242,7 @@ def indexed_again(root: DatasetRoot) -> set[str]:
     return set(indexed_twins(root))
 
 
-def _redo(ledger: Ledger, root: DatasetRoot, number: int, twin_id: str) -> None:
+def _discard_twin(ledger: Ledger, root: DatasetRoot, number: int, twin_id: str) -> None:
     """Remove a twin's folder and reopen its item, so that it is assembled again, from existing stage results where possible."""
     root.remove(root.twin_name(twin_id))
     ledger.reopen([number])

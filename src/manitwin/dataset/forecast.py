@@ -15,7 +15,7 @@ from manitwin.dataset.index.query import Index
 from manitwin.errors import TwinError, UsageError
 from manitwin.formats.printable import printable_line
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.shares import wilson_interval
+from manitwin.twin.proportions import wilson_interval
 
 LEAST_INPUTS = 5
 """Minimum number of built inputs; with fewer, a single outlier dominates the forecast."""
@@ -106,10 +106,10 @@ def forecast(
         )
     rng = np.random.default_rng(seed)
     busy = min(cores, items)  # one input uses one core
-    cpu_hours = _for_all(cpu_s / 3600, items, rng)
+    cpu_hours = _extrapolate(cpu_s / 3600, items, rng)
     accepted = len(set(status) - set(rejected))
     low, high = wilson_interval(accepted, len(ids))
-    services = _for_all(usd, items, rng)
+    services = _extrapolate(usd, items, rng)
     drawn = [ids[i] for i in sorted(rng.choice(len(ids), min(len(ids), MOST_SIZED), replace=False))]
     work = np.array([_bytes_below(root, f"{WORK}/{each}") for each in drawn])
     return Forecast(
@@ -123,9 +123,9 @@ def forecast(
         services_usd=services,
         usd=None
         if core_hour_usd is None
-        else Amount(*(c * core_hour_usd + s for c, s in zip(_of(cpu_hours), _of(services), strict=True))),
-        twins_bytes=_for_all(np.array([_bytes_below(root, root.twin_name(each)) for each in drawn]), items, rng),
-        work_bytes=_for_all(work, items, rng) if work.any() else None,
+        else Amount(*(c * core_hour_usd + s for c, s in zip(_as_tuple(cpu_hours), _as_tuple(services), strict=True))),
+        twins_bytes=_extrapolate(np.array([_bytes_below(root, root.twin_name(each)) for each in drawn]), items, rng),
+        work_bytes=_extrapolate(work, items, rng) if work.any() else None,
         index_bytes=_bytes_below(root, "index") / len(ids) * items,
         ledger_bytes=_bytes_of(root, "ledger.sqlite") / len(ids) * items,
         memory_bytes=_memory_bytes(root, busy),
@@ -133,11 +133,11 @@ def forecast(
     )
 
 
-def _of(amount: Amount) -> tuple[float, float, float]:
+def _as_tuple(amount: Amount) -> tuple[float, float, float]:
     return amount.value, amount.low, amount.high
 
 
-def _for_all(each: np.ndarray, items: int, rng: np.random.Generator) -> Amount:
+def _extrapolate(each: np.ndarray, items: int, rng: np.random.Generator) -> Amount:
     """Return the sum over ``items`` inputs, given a sample ``each`` (N,) of them, with the bootstrap interval of the mean."""
     kept = each if len(each) <= MOST_RESAMPLED else rng.choice(each, MOST_RESAMPLED, replace=False)
     counts = rng.multinomial(len(kept), np.full(len(kept), 1 / len(kept)), size=RESAMPLES)

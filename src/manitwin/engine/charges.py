@@ -37,7 +37,7 @@ def note_rehearsal() -> None:
 
 
 @contextmanager
-def counted() -> Iterator[Bill]:
+def record_charges() -> Iterator[Bill]:
     """Record the charges made within the ``with`` statement, even if it raises; they are added to an enclosing ``counted`` as
     well.
     """
@@ -81,11 +81,11 @@ class Budget:
         self.spent_usd += charged_usd
 
     @property
-    def nothing_under_way(self) -> bool:
+    def has_no_running_jobs(self) -> bool:
         """True if no paid job is running, so that the sum spent is final."""
         return not self._expected
 
-    def why_stopped(self, expected_usd: float) -> str:
+    def stop_reason(self, expected_usd: float) -> str:
         """Return the message for a job that may not start."""
         return (
             f"the next question costs about {expected_usd:.4f} USD, and {self.spent_usd:.4f} of at most"

@@ -13,15 +13,15 @@ from typing import Any, Literal, TypedDict, get_args
 from manitwin.config import RunConfig
 from manitwin.engine.driver import Driver
 from manitwin.engine.events import ItemEnded, OnStage
-from manitwin.engine.healing import heal, refuse_links
 from manitwin.engine.jobs import Executor, WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.ledger.location import CONFIG, LedgerCopy, cache_folder, local_ledger
 from manitwin.engine.recipe import Recipe
+from manitwin.engine.repair import heal, refuse_links
 from manitwin.engine.stage_runner import sweep
 from manitwin.engine.task import Payload
 from manitwin.engine.worker import InlineExecutor
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json
 
@@ -96,10 +96,10 @@ def drive(
     were already in the data set is added. Raises UsageError for invalid arguments, or if another run is writing there.
     """
     if executor not in EXECUTORS:
-        raise UsageError(choose_from("executor", executor, EXECUTORS))
+        raise UsageError(unknown_name_message("executor", executor, EXECUTORS))
     path, remarks = local_ledger(root), [] if remarks is None else remarks
     refuse_links(root)
-    ledger, given, new = _opened_with(payloads, recipe, path)
+    ledger, given, new = _open_ledger_with_items(payloads, recipe, path)
     copy = LedgerCopy(root, path)
 
     def ended(event: ItemEnded) -> None:
@@ -112,7 +112,7 @@ def drive(
         remarks += heal(ledger, root, recipe, given)
         root.write_bytes(CONFIG, canonical_json(configuration).encode())
         setup = WorkerSetup(root.url, recipe, cache_folder(root), settings.keep_work, settings.memory_gb)
-        remarks += _of_others(ledger, recipe, given)
+        remarks += _other_recipe_remarks(ledger, recipe, given)
         items, opened = ledger.totals(recipe.sha256, given, replaces=recipe.replaces)
         with _executor(executor, address, setup, settings, opened, remarks) as engine:
             driver = Driver(
@@ -130,7 +130,7 @@ def drive(
         copy.upload()
 
 
-def _opened_with(payloads: Iterable[Payload], recipe: Recipe, path: Path) -> tuple[Ledger, list[int], int]:
+def _open_ledger_with_items(payloads: Iterable[Payload], recipe: Recipe, path: Path) -> tuple[Ledger, list[int], int]:
     """Open the ledger and add items; return the numbers of the given items and how many are new.
 
     If this fails, a newly created ledger is removed.
@@ -138,7 +138,7 @@ def _opened_with(payloads: Iterable[Payload], recipe: Recipe, path: Path) -> tup
     made_folder = not path.parent.exists()
     ledger = Ledger(path)
     try:
-        ledger.restate(recipe.payload.from_json)
+        ledger.rewrite_payloads(recipe.payload.from_json)
         given, new = ledger.add_items(payloads)
         ledger.reopen(ledger.changed_since_end(given, recipe.payload.from_json))
         return ledger, given, new
@@ -150,11 +150,11 @@ def _opened_with(payloads: Iterable[Payload], recipe: Recipe, path: Path) -> tup
         raise
 
 
-def _of_others(ledger: Ledger, recipe: Recipe, given: list[int]) -> list[str]:
+def _other_recipe_remarks(ledger: Ledger, recipe: Recipe, given: list[int]) -> list[str]:
     """Return remarks on items that ended under another recipe: how many are made again, and how many stay as they are."""
-    others = len(ledger.ended_under_others(recipe.sha256))
+    others = len(ledger.ended_under_other_recipes(recipe.sha256))
     if not recipe.replaces:
-        stay = others - len(ledger.ended_under_others(recipe.sha256, replaces=False))
+        stay = others - len(ledger.ended_under_other_recipes(recipe.sha256, replaces=False))
         made = "made by another version of manitwin, or with another version of a file that the settings name"
         return (
             [
@@ -164,7 +164,7 @@ def _of_others(ledger: Ledger, recipe: Recipe, given: list[int]) -> list[str]:
             if stay
             else []
         )
-    again = len(ledger.ended_under_others(recipe.sha256, given))
+    again = len(ledger.ended_under_other_recipes(recipe.sha256, given))
     made = "made by another version of manitwin or with other settings"
     remarks = [f"{again} were {made}: {recipe.made_again}"] if again else []
     if others > again:

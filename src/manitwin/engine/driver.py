@@ -20,7 +20,7 @@ from manitwin.engine.charges import Budget
 from manitwin.engine.events import Announcer, ItemEnded, OnStage
 from manitwin.engine.flight import Flight, PlannedStage
 from manitwin.engine.gate import Gate
-from manitwin.engine.jobs import MAKE_ROOM, Executor, Failure, Job, Reply, StageRejected, Surveyed, WriteTables
+from manitwin.engine.jobs import MAKE_ROOM, Executor, Failure, Job, Reply, StageRejected, SurveyReply, WriteTables
 from manitwin.engine.ledger.ledger import Ledger, LedgerFull
 from manitwin.engine.recipe import Ending, Recipe
 from manitwin.engine.stage import ASSEMBLE, INPUT
@@ -94,7 +94,7 @@ class Driver:
             self.ledger.end_run(run, how)
         except LedgerFull as error:
             self.result.stopped = f"{error}; {MAKE_ROOM}"
-            self._let_end()  # the ledger cannot be written any more; the next run finds the results
+            self._wait_for_running_jobs()  # the ledger cannot be written any more; the next run finds the results
         except BaseException:
             with suppress(LedgerFull):
                 self.ledger.end_run(run, how)
@@ -107,7 +107,7 @@ class Driver:
             self._submit()
         self.ledger.commit()
         if not self._running and (self.result.stopped is not None or not (any(self._queues.values()) or self._more)):
-            return self.result.stopped is None and self._give_tables(self._tables.due_at_the_end())
+            return self.result.stopped is None and self._submit_table_job(self._tables.final_job())
         ended = [(ticket, reply, *self._running.pop(ticket)) for ticket, reply in self.executor.ended(self._wait_s())]
         parts = self.executor.parts()
         running = {ticket: self._running[ticket][0] for ticket in parts if ticket in self._running}
@@ -118,12 +118,12 @@ class Driver:
                 ticket, reply.charged_usd if isinstance(reply, Failure | StageRun | StageRejected) else 0.0
             )
             if flight is None:
-                self.result.stopped = self._tables.written(reply) or self.result.stopped
+                self.result.stopped = self._tables.handle_reply(reply) or self.result.stopped
             else:
                 self._handle(flight, needs, reply)
         return True
 
-    def _let_end(self) -> None:
+    def _wait_for_running_jobs(self) -> None:
         """Wait for all running jobs, so that no worker is stopped while it writes a folder."""
         while self._running:
             for ticket, _ in self.executor.ended(LONGEST_WAIT_S):
@@ -154,40 +154,40 @@ class Driver:
     def _submit(self) -> None:
         for needs, queue in self._queues.items():
             gate = self._gates[needs]
-            if gate.given_up:
-                self._leave(queue)
+            if gate.is_patience_exhausted:
+                self._defer_queue(queue)
             slots = self.executor.slots(needs)
             most = 2 * slots if needs == "cpu" else slots  # one job waits per core, so that no core is idle
             while queue and self._outstanding[needs] < most and gate.opens_in_s() <= 0:
                 if not self._budget.allows(queue[0][1].expected_usd):
-                    self._wait_for_money(queue)
+                    self._hold_for_budget(queue)
                     break
                 flight = heappop(queue)[1]
                 gate.begin()
                 self.ledger.stage_started(flight.number, flight.stage, flight.attempt(flight.stage))
                 self._announcer.stage_started(flight)
-                self._give(flight.job(), flight)
-        self._give_tables(self._tables.due())
+                self._submit_job(flight.job(), flight)
+        self._submit_table_job(self._tables.next_job())
 
-    def _wait_for_money(self, queue: list[tuple[tuple[int, int], Flight]]) -> None:
+    def _hold_for_budget(self, queue: list[tuple[tuple[int, int], Flight]]) -> None:
         """Leave items that exceed the budget once no paid job is running, as running jobs may cost less than expected."""
-        if self._budget.nothing_under_way:
-            self._no_money = self._budget.why_stopped(queue[0][1].expected_usd)
-            self._leave(queue)
+        if self._budget.has_no_running_jobs:
+            self._no_money = self._budget.stop_reason(queue[0][1].expected_usd)
+            self._defer_queue(queue)
 
-    def _give(self, job: Job, flight: Flight | None) -> None:
+    def _submit_job(self, job: Job, flight: Flight | None) -> None:
         self._tickets += 1
         self._budget.begin(self._tickets, 0.0 if flight is None else flight.expected_usd)
         self._running[self._tickets] = (flight, job.needs)
         self._outstanding[job.needs] += 1
         self.executor.submit(self._tickets, job)
 
-    def _give_tables(self, job: WriteTables | None) -> bool:
+    def _submit_table_job(self, job: WriteTables | None) -> bool:
         if job is not None:
-            self._give(job, None)
+            self._submit_job(job, None)
         return job is not None
 
-    def _leave(self, queue: list[tuple[tuple[int, int], Flight]]) -> None:
+    def _defer_queue(self, queue: list[tuple[tuple[int, int], Flight]]) -> None:
         """Leave the queued items to the next run."""
         self.result.left += len(queue)
         self._flights -= len(queue)
@@ -198,9 +198,9 @@ class Driver:
         if isinstance(reply, Failure):
             self._failed(flight, gate, reply)
             return
-        gate.answered()
-        if isinstance(reply, Surveyed):
-            self._surveyed(flight, reply)
+        gate.record_answer()
+        if isinstance(reply, SurveyReply):
+            self._handle_survey(flight, reply)
         elif isinstance(reply, StageRun):
             self._stage_done(flight, flight.stage, reply)
             self._queue(flight)
@@ -218,7 +218,7 @@ class Driver:
             self._announcer.stage_ended(flight, ASSEMBLE, "done")
             self._ended(flight, reply)
 
-    def _surveyed(self, flight: Flight, reply: Surveyed) -> None:
+    def _handle_survey(self, flight: Flight, reply: SurveyReply) -> None:
         answer = None if reply.rejected is None else str(reply.rejected.answer)
         self.ledger.stage_ended(
             flight.number, INPUT, "done" if answer is None else "rejected", attempts=flight.attempt(INPUT), ran=True,
@@ -228,7 +228,7 @@ class Driver:
         superseded = self.ledger.superseded_rejection(flight.number, reply.item_id)
         if superseded is not None:  # the input has changed: remove the rejected folder of its previous content
             self._remove(superseded)
-            self._tables.removed(superseded)
+            self._tables.record_removed(superseded)
         other = self.ledger.identify(flight.number, reply.item_id, reply.kind)
         flight.task = replace(flight.task, item_id=reply.item_id)
         if other is not None:
@@ -282,14 +282,14 @@ class Driver:
             flight.attempts[stage] = counted
             self.ledger.stage_ended(number, stage, "waiting", attempts=counted, error=failure.message)
             if failure.kind == "unavailable":
-                gate.down()
+                gate.record_outage()
             elif failure.kind == "rate_limited":
                 gate.wait(failure.retry_after_s)
             elif failure.kind == "no_space":
                 self.result.stopped = f"{failure.message}; {MAKE_ROOM}"
             elif failure.kind == "denied":
                 self.result.stopped = failure.message
-            left_s = gate.given_up_in_s if failure.kind == "unavailable" else None
+            left_s = gate.remaining_patience_s if failure.kind == "unavailable" else None
             self._announcer.stage_waits(flight, stage, failure.message, failure.trace, left_s)
             self._queue(flight)
             return

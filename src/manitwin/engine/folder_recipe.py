@@ -17,7 +17,7 @@ from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
 from manitwin.errors import ManiTwinError, NewerVersion, Rejected, TwinError
 from manitwin.formats.json_file import parse_json_object
-from manitwin.formats.schema_version import is_newer, of_newer_schema
+from manitwin.formats.schema_version import is_newer, newer_schema_message
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, sha256_of_json, write_bytes_atomically
 
@@ -72,7 +72,7 @@ class FolderRecipe(ABC, Generic[RecordT]):
         """
         version = parse_json_object(record, self.record, TwinError).get("schema_version")
         if is_newer(version, self.record_schema):
-            raise NewerVersion(of_newer_schema(self.record, version, self.record_schema))
+            raise NewerVersion(newer_schema_message(self.record, version, self.record_schema))
         return self.record_type.model_validate_json(record)  # type: ignore[return-value]
 
     def is_current(self, record: RecordT) -> bool:
@@ -116,7 +116,7 @@ class FolderRecipe(ABC, Generic[RecordT]):
         current = self.is_current(read) and self.amended_sha256(read) == amended_sha256
         return self.ending(read) if current else None
 
-    def seal(self, fresh: Path, said: dict[str, Any], *, decided_by: Any = None) -> RecordT:
+    def write_record(self, fresh: Path, said: dict[str, Any], *, decided_by: Any = None) -> RecordT:
         """Write the record, last of all files, with its revision: the digest of ``said``, together with ``decided_by`` if
         given.
         """

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from manitwin.engine.interrupts import SIGNALS, deferred_interrupts
-from manitwin.engine.process_bounds import die_with, one_thread_each
+from manitwin.engine.process_limits import limit_library_threads, set_parent_death_signal
 
 RUN = logging.getLogger("manitwin.run")
 LAST_PYTHON = (3, 13)
@@ -40,7 +40,7 @@ _state: Any = forkserver._forkserver
 _forked_by: int | None = None
 
 
-def why_not_forked(idle_threads: Collection[str] = ()) -> str | None:
+def fork_obstacle(idle_threads: Collection[str] = ()) -> str | None:
     """Return why this process must not be forked; None if it may be.
 
     ``idle_threads`` are the names of Python threads that hold no lock.
@@ -67,7 +67,7 @@ def forked_workers(modules: Iterable[str], idle_threads: Collection[str] = ()) -
     """
     for name in modules:
         import_module(name)
-    why_not = why_not_forked(idle_threads)
+    why_not = fork_obstacle(idle_threads)
     if why_not is not None:
         RUN.debug("each worker imports what it needs: %s", why_not)
         yield
@@ -133,19 +133,19 @@ def _serve(driver: int, listener: int, alive: int) -> NoReturn:
     """Run the server process: fork workers until the driver ends."""
     global _forked_by
     try:
-        die_with(driver)
-        _forget_program()
-        one_thread_each()
+        set_parent_death_signal(driver)
+        _reset_inherited_state()
+        limit_library_threads()
         _forked_by = os.getpid()
         forkserver.main(listener, alive, [])
     finally:
         os._exit(1)
 
 
-def _forget_program() -> None:
+def _reset_inherited_state() -> None:
     """Reset state that a spawned process would not inherit: signal handlers, log handlers and exit handlers.
 
-    SIGINT stays blocked, as in ``spared_from_interrupts``.
+    SIGINT stays blocked, as in ``shield_from_interrupts``.
     """
     atexit._clear()
     sys.unraisablehook = sys.__unraisablehook__

@@ -39,7 +39,7 @@ class Gate:
         if self._per_second is not None:
             self._tokens -= 1
 
-    def answered(self) -> None:
+    def record_answer(self) -> None:
         """Record an answer of the service: reset the failure state."""
         self._down_since, self._pause_s = None, FIRST_PAUSE_S
 
@@ -50,7 +50,7 @@ class Gate:
             self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
         self._paused_until = max(self._paused_until, self._clock() + seconds)
 
-    def down(self) -> None:
+    def record_outage(self) -> None:
         """Record that the service did not answer. Failures of jobs that started before the current pause are ignored."""
         now = self._clock()
         if now < self._paused_until:
@@ -59,13 +59,13 @@ class Gate:
         self.wait(None)
 
     @property
-    def given_up_in_s(self) -> float | None:
+    def remaining_patience_s(self) -> float | None:
         """Seconds for which a service that is down is still retried; None if it is not down."""
         if self._down_since is None:
             return None
         return max(0.0, self._down_since + self._patience_s - self._clock())
 
     @property
-    def given_up(self) -> bool:
+    def is_patience_exhausted(self) -> bool:
         """True if the service has been down for longer than ``patience_s``."""
-        return self.given_up_in_s == 0
+        return self.remaining_patience_s == 0

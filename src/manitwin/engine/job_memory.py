@@ -58,7 +58,7 @@ class RootJobMemory:
         return f"{self.name}/{request}.json"
 
 
-class NoMemory:
+class NullJobMemory:
     """Job memory that stores nothing, for generators whose jobs end with the process."""
 
     def recall(self, request: str) -> str | None:

@@ -43,7 +43,7 @@ class Survey:
 
 
 @dataclass(frozen=True)
-class Surveyed:
+class SurveyReply:
     """The reply to ``Survey``: how the existing finished folder ended, or the stages that need not run again."""
 
     item_id: str
@@ -114,7 +114,7 @@ class Failure:
 
 
 Job = Survey | RunStage | Finish | WriteTables
-Reply = Surveyed | StageRun | StageRejected | Ending | Failure | None
+Reply = SurveyReply | StageRun | StageRejected | Ending | Failure | None
 
 
 class Executor(Protocol):

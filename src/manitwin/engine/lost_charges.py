@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from manitwin.engine.charges import Bill, counted
+from manitwin.engine.charges import Bill, record_charges
 from manitwin.errors import TwinError
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.json_file import json_number, parse_json
@@ -18,9 +18,9 @@ MAX_LOST_BYTES = 64
 
 
 @contextmanager
-def kept_bill(stage_folder: Path) -> Iterator[Bill]:
+def keep_lost_charges(stage_folder: Path) -> Iterator[Bill]:
     """Record charges; if the work fails, add them to the stage's lost charges."""
-    with counted() as bill:
+    with record_charges() as bill:
         try:
             yield bill
         except BaseException:

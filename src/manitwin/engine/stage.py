@@ -18,7 +18,7 @@ from typing import Any, Generic, Protocol, runtime_checkable
 from pydantic import BaseModel
 
 from manitwin.config import Resource
-from manitwin.engine.job_memory import JobMemory, NoMemory
+from manitwin.engine.job_memory import JobMemory, NullJobMemory
 from manitwin.engine.task import PayloadT
 from manitwin.errors import ManiTwinError
 
@@ -46,7 +46,7 @@ class Draft(Generic[PayloadT]):
     fields: dict[str, Any] = dataclass_field(default_factory=dict)
     paths: dict[str, Path] = dataclass_field(default_factory=dict)
     digests: dict[str, str] = dataclass_field(default_factory=dict)
-    jobs: JobMemory = dataclass_field(default_factory=NoMemory)
+    jobs: JobMemory = dataclass_field(default_factory=NullJobMemory)
     rehearsed: set[str] = dataclass_field(default_factory=set)
     amendments: dict[str, dict[str, Any]] = dataclass_field(default_factory=dict)
 
@@ -147,7 +147,7 @@ class StagePart:
 _hear: ContextVar[Callable[[StagePart], None] | None] = ContextVar("hear_stage_parts", default=None)
 
 
-def tell_part(done: int, total: int, unit: str) -> None:
+def report_progress(done: int, total: int, unit: str) -> None:
     """Report the progress of the stage that runs in this context; cheap without a listener."""
     hear = _hear.get()
     if hear is not None:
@@ -155,7 +155,7 @@ def tell_part(done: int, total: int, unit: str) -> None:
 
 
 @contextmanager
-def heard_by(hear: Callable[[StagePart], None]) -> Iterator[None]:
+def progress_listener(hear: Callable[[StagePart], None]) -> Iterator[None]:
     """Call ``hear`` with the progress of stages that run within the ``with`` statement."""
     token = _hear.set(hear)
     try:

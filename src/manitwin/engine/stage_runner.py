@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from manitwin.engine.ledger.location import cache_folder
-from manitwin.engine.lost_charges import LOST, kept_bill, lost_usd
+from manitwin.engine.lost_charges import LOST, keep_lost_charges, lost_usd
 from manitwin.engine.stage import Draft, Stage, is_field
 from manitwin.errors import ManiTwinError, TwinError
 from manitwin.formats.json_file import read_json_object
@@ -65,14 +65,14 @@ def stage_key(stage: Stage, draft: Draft) -> str:
         "backend": stage.backend,
         "model": stage.model,
         "seed": draft.seed,
-        "reads": {name: _digest(name, draft) for name in present_reads(stage, draft.names())},
+        "reads": {name: _digest(name, draft) for name in available_reads(stage, draft.names())},
     }
     if draft.amendments.get(stage.name):
         decides["amendment"] = draft.amendments[stage.name]
     return sha256_of_json(decides)[:24]
 
 
-def present_reads(stage: Stage, names: Collection[str]) -> list[str]:
+def available_reads(stage: Stage, names: Collection[str]) -> list[str]:
     """Return the artifacts that a stage reads out of those available; optional ones (``?``) only if available."""
     reads = []
     for name in stage.reads:
@@ -98,13 +98,13 @@ def run_stage(stage: Stage, draft: Draft, work: Path, require_same: Callable[[],
     """
     key = stage_key(stage, draft)
     place = work / stage.name / key
-    reused = is_whole(place)
+    reused = is_complete_result(place)
     if not reused:
         _run_into(stage, draft, place, require_same)
-    return StageRun(key, take_up(place, stage.writes, draft), reused)
+    return StageRun(key, load_result(place, stage.writes, draft), reused)
 
 
-def take_up(place: Path, names: Iterable[str], draft: Draft) -> StageCost:
+def load_result(place: Path, names: Iterable[str], draft: Draft) -> StageCost:
     """Load the result of a stage at ``place`` into the draft; return its cost. Raises TwinError if it is malformed."""
     result = read_json_object(place / RESULT, TwinError, name=str(place / RESULT), remedy=_ANEW)
     try:
@@ -120,7 +120,7 @@ def take_up(place: Path, names: Iterable[str], draft: Draft) -> StageCost:
     return cost
 
 
-def is_whole(place: Path, *, digests: bool = True) -> bool:
+def is_complete_result(place: Path, *, digests: bool = True) -> bool:
     """Return whether a result is complete and, with ``digests``, whether its files match their digests."""
     if not (place / RESULT).is_file():
         return False
@@ -144,7 +144,7 @@ def _run_into(stage: Stage, draft: Draft, place: Path, require_same: Callable[[]
     fresh.mkdir(parents=True)
     try:
         started, cpu_started = time.perf_counter(), _cpu_seconds()
-        with kept_bill(place.parent) as bill:
+        with keep_lost_charges(place.parent) as bill:
             try:
                 fields = stage.run(draft, fresh)
             finally:
@@ -209,21 +209,21 @@ class WorkFolder:
         for name, key in done:
             writes = stages[name].writes
             self._fetch(name, key, [w for w in writes if not is_field(w) and (wanted is None or w in wanted)])
-            costs[name] = take_up(self.place / name / key, writes, draft)
+            costs[name] = load_result(self.place / name / key, writes, draft)
         return costs
 
     def run(self, stage: Stage, draft: Draft, require_same: Callable[[], None] = lambda: None) -> StageRun:
         """Run a stage or reuse its result, and store it below the root; ``require_same`` as in ``run_stage``."""
         if self.root.local is not None:
             return run_stage(stage, draft, self.place, require_same)
-        with self._shared_bill(stage.name):
+        with self._share_lost_charges(stage.name):
             ran = run_stage(stage, draft, self.place, require_same)
         if not ran.reused:
             self._publish(stage.name, ran.key)
         return ran
 
     @contextmanager
-    def _shared_bill(self, stage: str) -> Iterator[None]:
+    def _share_lost_charges(self, stage: str) -> Iterator[None]:
         """Share the lost charges of a stage through the URL: the next attempt may run on another machine."""
         name, place = f"{self.name}/{stage}/{LOST}", self.place / stage / LOST
         if self.root.exists(name):
@@ -242,19 +242,19 @@ class WorkFolder:
         if not self.has(stage.name, key):
             return None
         place = self.place / stage.name / key
-        if self.root.local is not None and not is_whole(place):
+        if self.root.local is not None and not is_complete_result(place):
             RUN.warning("%s: damaged; the stage runs again", place)
             shutil.rmtree(place)
             return None
         self._fetch(stage.name, key, [])
-        return StageRun(key, take_up(self.place / stage.name / key, stage.writes, draft), True)
+        return StageRun(key, load_result(self.place / stage.name / key, stage.writes, draft), True)
 
     def sweep(self) -> None:
         """Delete partial results of interrupted stages."""
         for stale in (*self.place.glob("*/.*"), self.fresh):
             shutil.rmtree(stale, ignore_errors=True)
 
-    def drop(self) -> None:
+    def delete_results(self) -> None:
         """Delete all results: the item has ended and will not be resumed."""
         shutil.rmtree(self.place, ignore_errors=True)
         if self.root.local is None:

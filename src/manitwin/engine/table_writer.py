@@ -24,23 +24,23 @@ class TableWriter:
         """Count an ended item, which may have added a twin."""
         self._ended += 1
 
-    def removed(self, item_id: str) -> None:
+    def record_removed(self, item_id: str) -> None:
         """Record that a finished folder was removed, so that its rows are removed from the tables."""
         self._removed.add(item_id)
 
-    def due(self) -> WriteTables | None:
+    def next_job(self) -> WriteTables | None:
         """Return the next job if enough items have ended and no other table job is running; otherwise None."""
         if not self._every or self._ended < self._every or self._under_way is not None:
             return None
-        return self._of_unwritten_twins()
+        return self._next_update()
 
-    def due_at_the_end(self) -> WriteTables | None:
+    def final_job(self) -> WriteTables | None:
         """Return the next job once no item is in progress; None when everything is written and merged."""
         if not self._every:
             return None
-        return self._of_unwritten_twins() or (None if self._merged else self._begun(WriteTables(())))
+        return self._next_update() or (None if self._merged else self._start_job(WriteTables(())))
 
-    def written(self, reply: Reply) -> str | None:
+    def handle_reply(self, reply: Reply) -> str | None:
         """Process the reply to the running table job; return the reason if the run must stop."""
         job, self._under_way = self._under_way, None
         if isinstance(reply, Failure):
@@ -50,7 +50,7 @@ class TableWriter:
             if self._failures >= self._attempts:
                 return f"the index cannot be written: {reply.message}; `manitwin check` reports what is wrong"
         elif job is not None and job.item_ids:
-            self._ledger.indexed(job.item_ids)
+            self._ledger.mark_indexed(job.item_ids)
             self._removed -= set(job.item_ids)
             self._merged = False
             self._failures = 0
@@ -58,11 +58,11 @@ class TableWriter:
             self._merged = True
         return None
 
-    def _of_unwritten_twins(self) -> WriteTables | None:
+    def _next_update(self) -> WriteTables | None:
         self._ended = 0
-        item_ids = (*self._ledger.not_indexed(10 * self._every), *sorted(self._removed))
-        return self._begun(WriteTables(item_ids)) if item_ids else None
+        item_ids = (*self._ledger.unindexed_ids(10 * self._every), *sorted(self._removed))
+        return self._start_job(WriteTables(item_ids)) if item_ids else None
 
-    def _begun(self, job: WriteTables) -> WriteTables:
+    def _start_job(self, job: WriteTables) -> WriteTables:
         self._under_way = job
         return job

@@ -11,7 +11,7 @@ from functools import partial
 
 from manitwin.config import Resource
 from manitwin.engine.amendments import AMENDMENTS, Amendments, amendments_sha256, read_amendments
-from manitwin.engine.charges import counted
+from manitwin.engine.charges import record_charges
 from manitwin.engine.job_memory import RootJobMemory
 from manitwin.engine.jobs import (
     Failure,
@@ -21,14 +21,14 @@ from manitwin.engine.jobs import (
     RunStage,
     StageRejected,
     Survey,
-    Surveyed,
+    SurveyReply,
     WorkerSetup,
     WriteTables,
 )
 from manitwin.engine.lost_charges import lost_usd
 from manitwin.engine.recipe import Ending
 from manitwin.engine.stage import INPUT, Draft, Stage, StagePart
-from manitwin.engine.stage_runner import JOBS, StageCost, StageRun, WorkFolder, present_reads
+from manitwin.engine.stage_runner import JOBS, StageCost, StageRun, WorkFolder, available_reads
 from manitwin.engine.task import Payload, Task
 from manitwin.errors import (
     AccessDenied,
@@ -60,7 +60,7 @@ class Worker:
 
     def do(self, job: Job) -> Reply:
         """Run a job and return the reply; exceptions become a Failure, except those that end the process."""
-        with counted() as bill:
+        with record_charges() as bill:
             reply = self._reply(job)
         if isinstance(reply, Failure | StageRun | StageRejected):
             return replace(reply, charged_usd=bill.usd)
@@ -87,7 +87,9 @@ class Worker:
             kind = "no_space" if error.errno in NO_SPACE else "error"
             return Failure(kind, _line(error))  # type: ignore[arg-type]
         except MemoryError:
-            return Failure("error", f"it {too_much_memory(self.setup.memory_gb)}; raise the limit, or use fewer --jobs")
+            return Failure(
+                "error", f"it {out_of_memory_message(self.setup.memory_gb)}; raise the limit, or use fewer --jobs"
+            )
         except Exception as error:
             where = traceback.extract_tb(error.__traceback__)[-1]
             said = f"{_line(error)} ({where.filename.rsplit('/', 1)[-1]}:{where.lineno})"
@@ -109,12 +111,12 @@ class Worker:
             self._stages[kind] = self.setup.recipe.stages(kind)
         return self._stages[kind]
 
-    def _survey(self, job: Survey) -> Surveyed:
+    def _survey(self, job: Survey) -> SurveyReply:
         identity = self.setup.recipe.identify(job.task.payload)
         ending = self._ending(identity.item_id)
         if identity.rejected is not None:
             rejected = StageRejected(identity.rejected, StageCost(0.0, 0.0, 0.0))
-            return Surveyed(identity.item_id, identity.kind, ending, rejected=rejected)
+            return SurveyReply(identity.item_id, identity.kind, ending, rejected=rejected)
         work, draft = self._work(identity.item_id), self._draft(identity.item_id, job.task.payload)
         work.sweep()
         done: list[tuple[str, StageRun]] = []
@@ -123,7 +125,7 @@ class Worker:
             if found is None:
                 break
             done.append((stage.name, found))
-        return Surveyed(identity.item_id, identity.kind, ending, tuple(done))
+        return SurveyReply(identity.item_id, identity.kind, ending, tuple(done))
 
     def _ending(self, item_id: str) -> Ending | None:
         recipe = self.setup.recipe
@@ -149,8 +151,8 @@ class Worker:
         writers = {s.name for s in stages if wanted & set(s.writes)}
         work.load(draft, [d for d in job.done if d[0] in writers], {s.name: s for s in stages}, wanted)
         started, cpu_started = time.perf_counter(), time.process_time()
-        reads_input = not present_reads(stage, draft.names())
-        require_same = partial(self._require_same, job.task) if reads_input else _nothing
+        reads_input = not available_reads(stage, draft.names())
+        require_same = partial(self._require_same, job.task) if reads_input else _do_nothing
         try:
             return work.run(stage, draft, require_same)
         except (Rejected, MemoryError) as error:
@@ -178,12 +180,12 @@ class Worker:
             self._require_same(job.task)
             raise
         except InputChanged:
-            work.drop()  # it is unknown which results belong to the bytes that the id stands for
+            work.delete_results()  # it is unknown which results belong to the bytes that the id stands for
             raise
         finally:
             shutil.rmtree(work.fresh, ignore_errors=True)
         if not self.setup.keep_work:
-            work.drop()
+            work.delete_results()
         return ending
 
     def _require_same(self, task: Task) -> None:
@@ -214,11 +216,11 @@ class Worker:
         return read_amendments(self.root, item_id) if self._amends else {}
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Do nothing: the stage does not read the input."""
 
 
-def too_much_memory(memory_gb: float) -> str:
+def out_of_memory_message(memory_gb: float) -> str:
     """Return the message for work that exceeded a worker's memory."""
     return (
         f"needs more than run.memory_gb = {memory_gb:g} GB of memory"
@@ -229,7 +231,7 @@ def too_much_memory(memory_gb: float) -> str:
 
 def too_large(job: RunStage, memory_gb: float) -> Rejected:
     """Return the rejection of an item for which a stage exceeded a worker's memory."""
-    said = f"{job.task.payload.title}: stage {job.stage} {too_much_memory(memory_gb)}"
+    said = f"{job.task.payload.title}: stage {job.stage} {out_of_memory_message(memory_gb)}"
     return Rejected(TOO_LARGE, f"{said}; simplify the mesh, reduce the size of its textures, or raise run.memory_gb")
 
 

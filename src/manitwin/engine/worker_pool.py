@@ -9,7 +9,7 @@ from typing import Any
 from pebble import ProcessPool
 
 from manitwin.engine.interrupts import deferred_interrupts
-from manitwin.engine.worker_processes import WorkerContext, spared_from_interrupts
+from manitwin.engine.worker_processes import WorkerContext, shield_from_interrupts
 
 
 class WorkerPool:
@@ -45,7 +45,7 @@ class WorkerPool:
         Raises RuntimeError if all processes have died before.
         """
         with deferred_interrupts():
-            with spared_from_interrupts():
+            with shield_from_interrupts():
                 future = self._processes.schedule(function, args=args, timeout=timeout_s)
             future.add_done_callback(on_end)
             return future
@@ -59,7 +59,7 @@ class WorkerPool:
         with deferred_interrupts():
             return future.result()
 
-    def refuse(self) -> None:
+    def close_to_new_calls(self) -> None:
         """Accept no further calls and start no further processes."""
         with deferred_interrupts():
             self._processes.stop()

@@ -14,7 +14,7 @@ from multiprocessing.synchronize import RLock
 from typing import Any
 
 from manitwin.engine.fork_server import start_forked
-from manitwin.engine.process_bounds import one_thread_in_new_processes
+from manitwin.engine.process_limits import limit_child_threads
 
 LARGE_BYTES = 2 << 20  # blocks from this size on are mapped individually
 M_MMAP_THRESHOLD = -3  # mallopt(3)
@@ -22,7 +22,7 @@ KEPT_BYTES = 16 << 20  # free memory that stays mapped for the next stage
 
 
 @contextmanager
-def spared_from_interrupts() -> Iterator[None]:
+def shield_from_interrupts() -> Iterator[None]:
     """Shield processes that are spawned by threads started within the ``with`` statement from Ctrl-C.
 
     A terminal sends SIGINT to all of them, and a process that is still importing would print a traceback. A thread inherits the
@@ -52,7 +52,7 @@ class _AllocatorState(ctypes.Structure):
     )  # fmt: skip
 
 
-def keep_imported() -> None:
+def freeze_garbage_collector() -> None:
     """Exempt all current objects from garbage collection, which then takes milliseconds for newer objects."""
     gc.freeze()
 
@@ -92,7 +92,7 @@ class _WorkerProcess(SpawnProcess):
         forked = start_forked(process_obj)
         if forked is not None:
             return forked
-        with one_thread_in_new_processes():
+        with limit_child_threads():
             return SpawnProcess._Popen(process_obj)
 
 

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from manitwin.errors import EpisodesError
 from manitwin.formats.parquet_file import open_parquet
-from manitwin.twin.store import file_beside
+from manitwin.twin.store import atomic_file
 
 OUTCOMES = (
     "kept", "unplanned_contact", "disturbed", "misplaced", "toppled", "goal_missed", "dropped", "not_lifted", "replan_failed",
@@ -135,7 +135,7 @@ def attempts_table(attempts: Iterable[Attempt]) -> pa.Table:
 
 def write_attempts(path: Path, attempts: Iterable[Attempt]) -> None:
     """Write attempts as a Parquet file, atomically and deterministically."""
-    with file_beside(path) as beside:
+    with atomic_file(path) as beside:
         pq.write_table(attempts_table(attempts), beside, compression="zstd", version="2.6")
 
 
@@ -162,7 +162,7 @@ def merge_attempts(files: Iterable[Path], place: Path) -> tuple[int, int]:
     rows = kept = waiting = 0
     buffer: list[pa.Table] = []
     with (
-        file_beside(place) as beside,
+        atomic_file(place) as beside,
         pq.ParquetWriter(beside, MERGED_SCHEMA, compression="zstd", version="2.6") as writer,
     ):
         for path in files:
@@ -188,7 +188,7 @@ def _numbered(table: pa.Table, kept: int) -> tuple[pa.Table, int]:
 
 
 @dataclass
-class Tally:
+class StageCounts:
     """Counts of attempts by the stage they reached."""
 
     attempted: int = 0
@@ -205,15 +205,15 @@ class Tally:
 
 
 @dataclass(frozen=True)
-class Success:
+class AttemptCounts:
     """Counts of attempts in total, by category and by outcome, and the objects (id, category) that never succeeded.
 
     ``plan_failures``: for attempts without a plan, failure reasons of grasps, frequent ones first. ``without_grasp``: objects
     without a grasp for the hand. ``transferred``: number of attempts with a grasp verified for other jaws.
     """
 
-    total: Tally = field(default_factory=Tally)
-    by_category: Mapping[str, Tally] = field(default_factory=dict)
+    total: StageCounts = field(default_factory=StageCounts)
+    by_category: Mapping[str, StageCounts] = field(default_factory=dict)
     outcomes: Mapping[str, int] = field(default_factory=dict)
     never: tuple[tuple[str, str], ...] = ()
     plan_failures: Mapping[str, int] = field(default_factory=dict)
@@ -225,9 +225,9 @@ def _frequent_first(counted: Counter[str]) -> dict[str, int]:
     return dict(sorted(counted.items(), key=lambda item: (-item[1], item[0])))
 
 
-def success_of(attempts: Iterable[Attempt]) -> Success:
+def count_attempts(attempts: Iterable[Attempt]) -> AttemptCounts:
     """Return the counts of attempts, in total and by category and outcome."""
-    total, by_category, outcomes = Tally(), dict[str, Tally](), Counter[str]()
+    total, by_category, outcomes = StageCounts(), dict[str, StageCounts](), Counter[str]()
     categories, successful = dict[str, str](), set[str]()
     failures, without_grasp, transferred = Counter[str](), set[tuple[str, str]](), 0
     for attempt in attempts:
@@ -239,11 +239,11 @@ def success_of(attempts: Iterable[Attempt]) -> Success:
         elif attempt.outcome == "no_grasp":
             without_grasp.add((attempt.twin_id, attempt.category))
         if attempt.twin_id:
-            by_category.setdefault(attempt.category, Tally()).add(attempt)
+            by_category.setdefault(attempt.category, StageCounts()).add(attempt)
             categories.setdefault(attempt.twin_id, attempt.category)
             if attempt.succeeded:
                 successful.add(attempt.twin_id)
-    return Success(
+    return AttemptCounts(
         total,
         dict(sorted(by_category.items())),
         _frequent_first(outcomes),

@@ -16,7 +16,7 @@ from manitwin.engine.folder_recipe import FolderRecord
 from manitwin.engine.task import Payload
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.formats.json_file import read_json_object
-from manitwin.formats.schema_version import is_newer, of_newer_schema
+from manitwin.formats.schema_version import is_newer, newer_schema_message
 from manitwin.twin.store import sha256_of_json
 
 BATCHES = "batches"
@@ -43,7 +43,7 @@ class Batch(Payload):
         return range(self.first, self.first + self.count * self.step, self.step)
 
     @property
-    def of(self) -> str:
+    def source_id(self) -> str:
         """The id of its twin, scene or task."""
         return self.twin_id or self.scene_id or self.task_id or ""
 
@@ -55,7 +55,7 @@ class Batch(Payload):
     @property
     def title(self) -> str:
         """Display title."""
-        return f"episodes {self.numbers[0]} to {self.numbers[-1]} of {self.of}"
+        return f"episodes {self.numbers[0]} to {self.numbers[-1]} of {self.source_id}"
 
     @classmethod
     def from_json(cls, fields: Mapping[str, Any]) -> Batch:
@@ -70,7 +70,7 @@ class Batch(Payload):
         return {name: value for name, value in super().to_json().items() if name not in left_out}
 
 
-def batches(
+def missing_batches(
     robot: str,
     episodes: int,
     size: int,
@@ -94,8 +94,8 @@ def batches(
         if not taken.isdisjoint(batch.numbers):
             raise UsageError(f"batch {batch.batch_id} repeats episodes of another one; {REMEDY_OF_REPEATS}")
         taken.update(batch.numbers)
-        if batch.of in counts:
-            counts[batch.of] += batch.count
+        if batch.source_id in counts:
+            counts[batch.source_id] += batch.count
     fewest = [(count, place, each) for place, (each, count) in enumerate(counts.items())]
     heapq.heapify(fewest)
     numbers: dict[str, list[int]] = {each: [] for each in ids}
@@ -155,7 +155,7 @@ def read_batch(folder: Path) -> BatchRecord:
     path = folder / BATCH_RECORD
     said = read_json_object(path, EpisodesError, inside=folder, name=str(path), remedy=_REMEDY)
     if is_newer(said.get("schema_version"), BATCH_SCHEMA_VERSION):
-        raise EpisodesError(of_newer_schema(path, said["schema_version"], BATCH_SCHEMA_VERSION))
+        raise EpisodesError(newer_schema_message(path, said["schema_version"], BATCH_SCHEMA_VERSION))
     try:
         return BatchRecord(**said)
     except ValidationError as error:

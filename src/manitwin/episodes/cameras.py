@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.geometry.poses import transform
 from manitwin.render.cameras import OPENGL_TO_OPENCV, Camera, look_at
 from manitwin.robots.grippers.parallel import ParallelGripper
@@ -63,7 +63,7 @@ def named_cameras(names: Iterable[str], robot: Robot) -> list[NamedCamera]:
     cameras = []
     for name in names:
         if name not in makers:
-            raise UsageError(choose_from("camera", name, makers))
+            raise UsageError(unknown_name_message("camera", name, makers))
         cameras.append(makers[name](robot))
     return cameras
 

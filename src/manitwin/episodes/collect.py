@@ -6,14 +6,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from manitwin.episodes.attempts import ATTEMPTS, Success, merge_attempts, read_attempts, success_of
+from manitwin.episodes.attempts import ATTEMPTS, AttemptCounts, count_attempts, merge_attempts, read_attempts
 from manitwin.episodes.batch import BATCH_RECORD, BATCHES, REMEDY_OF_REPEATS, read_batch
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile, has_granules
 from manitwin.episodes.hdf5_merge import merge_episodes
 from manitwin.episodes.lerobot.write import write_lerobot
 from manitwin.episodes.stored_episode import StoredEpisode
-from manitwin.errors import EpisodesError, UsageError, choose_from
+from manitwin.errors import EpisodesError, UsageError, unknown_name_message
 
 LEROBOT, MANISKILL = "lerobot", "maniskill"
 FORMATS = (LEROBOT, MANISKILL)
@@ -33,7 +33,7 @@ class AttemptTotals:
 
 
 @dataclass(frozen=True)
-class Collected:
+class CollectionSummary:
     """Summary lines for the end of a run, and the numbers in them."""
 
     lines: list[str]
@@ -45,7 +45,7 @@ def chosen_formats(given: Iterable[str]) -> list[str]:
     names = [name.strip() for name in given if name.strip()]
     for name in names:
         if name not in FORMATS:
-            raise UsageError(choose_from("format", name, FORMATS))
+            raise UsageError(unknown_name_message("format", name, FORMATS))
     return names
 
 
@@ -86,7 +86,7 @@ def any_granules(folders: Iterable[Path]) -> bool:
     return False
 
 
-def collect(out: Path, formats: list[str]) -> Collected:
+def collect(out: Path, formats: list[str]) -> CollectionSummary:
     """Write the table of attempts and the data sets of the kept episodes, each atomically."""
     folders = batch_folders(out)
     _, kept = merge_attempts([folder / ATTEMPTS for folder in folders], out / ATTEMPTS)
@@ -97,7 +97,7 @@ def collect(out: Path, formats: list[str]) -> Collected:
     return _collected(out)
 
 
-def _whose_grasps(success: Success) -> list[str]:
+def _whose_grasps(success: AttemptCounts) -> list[str]:
     """Return lines on the number of episodes with grasps verified for another gripper, with the remedy."""
     if not success.transferred:
         return []
@@ -108,7 +108,7 @@ def _whose_grasps(success: Success) -> list[str]:
     ]
 
 
-def _why_never_executed(success: Success) -> list[str]:
+def _planning_failure_lines(success: AttemptCounts) -> list[str]:
     """Return lines on planning failures and on twins without grasps for the hand, with the remedy."""
     lines = []
     if failures := success.plan_failures:
@@ -123,8 +123,8 @@ def _why_never_executed(success: Success) -> list[str]:
     return lines
 
 
-def _collected(out: Path) -> Collected:
-    success = success_of(read_attempts(out / ATTEMPTS))
+def _collected(out: Path) -> CollectionSummary:
+    success = count_attempts(read_attempts(out / ATTEMPTS))
     total, outcomes = success.total, dict(sorted(success.outcomes.items()))
     failed = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items() if outcome != "kept")
     lines = [
@@ -132,7 +132,7 @@ def _collected(out: Path) -> Collected:
         f" ({total.succeeded / max(1, total.executed):.1%} of the executed), {total.kept} kept",
         f"not kept: {failed or 'none'}",
         *_whose_grasps(success),
-        *_why_never_executed(success),
+        *_planning_failure_lines(success),
     ]
     if success.never:
         lines.append("no success with: " + ", ".join(f"{twin_id} {category}" for twin_id, category in success.never))
@@ -144,4 +144,4 @@ def _collected(out: Path) -> Collected:
         outcomes,
         [twin_id for twin_id, _ in success.never],
     )
-    return Collected(lines, totals)
+    return CollectionSummary(lines, totals)

@@ -34,7 +34,7 @@ class CommandedArm:
         """Whether the current or previous hand command differs from the initial one."""
         return may_hold(self.told, self.before, self.open)
 
-    def choose(self) -> None:
+    def update_hand_command(self) -> None:
         """Choose the hand command for the end of the row that begins."""
         self.before, told = self.told, self.told
         if self.presses:
@@ -43,6 +43,6 @@ class CommandedArm:
             told, self.next_told = self.next_told, next(self.rest_told, None)
         self.told = np.asarray(told, np.float32).astype(float)
 
-    def tell(self, share: float) -> None:
+    def set_hand_target(self, share: float) -> None:
         """Set the hand's target at a ``share`` of its motion in the row."""
         self.hand.tell(self.before + share * (self.told - self.before))

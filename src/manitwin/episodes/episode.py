@@ -7,18 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from manitwin.episodes.courses.course import Course, Ended, Planner, Start
+from manitwin.episodes.courses.course import Course, EpisodeEnded, EpisodeStart, Planner
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.execution import FRAME_S, Execution
 from manitwin.episodes.goals.world_state import Granules
-from manitwin.episodes.granule_counts import held_by, with_granule_counts
+from manitwin.episodes.granule_counts import count_granules, with_granule_counts
+from manitwin.episodes.grasp_retry import execute_with_retry
 from manitwin.episodes.judging import is_reached_already, judge
 from manitwin.episodes.outcome import moved_m, turned_rad
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.planning.two_arms import TwoArmPlanner
 from manitwin.episodes.recording import Recording
-from manitwin.episodes.second_grasp import carry_out
-from manitwin.episodes.sequence import GoalSequence, course_of, later_courses
+from manitwin.episodes.sequence import GoalSequence, create_course, later_courses
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.skill import SkillGoal
 from manitwin.physics.sapien.world import RobotWorld
@@ -43,8 +43,8 @@ def run_episode(
     arguments.
     """
     facts, recording, closing = EpisodeFacts(), None, closing_of(robot, settings)
-    with world_of(problem, robot, settings, closing.force_n) as world:
-        start = settled(problem, planner, settings, skill_goal, world)
+    with create_world(problem, robot, settings, closing.force_n) as world:
+        start = settle_start(problem, planner, settings, skill_goal, world)
         if start is None:
             facts.outcome = "unsettled"
         elif is_reached_already(start, world):
@@ -53,13 +53,13 @@ def run_episode(
             execution = Execution(world, robot, closing, *tip_poses_of(planner))
             execution.literal = None if sequence is None else 0
             if sequence is not None:
-                world.will_hold(sequence.moved)
+                world.set_held_objects(sequence.moved)
             try:
-                course = carry_out(course, world, execution)
+                course = execute_with_retry(course, world, execution)
                 for later in () if sequence is None else later_courses(sequence, start, world, execution, facts):
-                    course = carry_out(later, world, execution)
+                    course = execute_with_retry(later, world, execution)
                 judge(start, course.goal_object_to_world, facts, world, execution)
-            except Ended as end:
+            except EpisodeEnded as end:
                 facts.outcome = str(end)
             facts.length_s = execution.length_s
             facts.unplanned = tuple(sorted(execution.unplanned))
@@ -79,7 +79,9 @@ def tip_poses_of(planner: Planner) -> tuple[Callable[[np.ndarray], np.ndarray], 
     return (planner.tip_pose, *taker)
 
 
-def world_of(problem: PickPlaceProblem, robot: Robot, settings: EpisodeSettings, closing_force_n: float) -> RobotWorld:
+def create_world(
+    problem: PickPlaceProblem, robot: Robot, settings: EpisodeSettings, closing_force_n: float
+) -> RobotWorld:
     """Create the physics world of a problem."""
     return RobotWorld(
         robot,
@@ -97,20 +99,20 @@ def world_of(problem: PickPlaceProblem, robot: Robot, settings: EpisodeSettings,
     )
 
 
-def _first_course(start: Start, facts: EpisodeFacts, sequence: GoalSequence | None) -> Course:
+def _first_course(start: EpisodeStart, facts: EpisodeFacts, sequence: GoalSequence | None) -> Course:
     if sequence is None:
-        return course_of(start, facts)
+        return create_course(start, facts)
     start.moved, start.partners = sequence.moved, sequence.partners
-    return course_of(replace(start, skill_goal=sequence.steps[0].goal), facts)
+    return create_course(replace(start, skill_goal=sequence.steps[0].goal), facts)
 
 
-def settled(
+def settle_start(
     problem: PickPlaceProblem,
     planner: Planner,
     settings: EpisodeSettings,
     skill_goal: SkillGoal | None,
     world: RobotWorld,
-) -> Start | None:
+) -> EpisodeStart | None:
     """Let the objects settle and return the start at their resting poses; None if an object does not stay in place."""
     if skill_goal is not None and skill_goal.granules is not None:
         world.add_granules(skill_goal.granules)
@@ -128,10 +130,12 @@ def settled(
         target=rested[world.target],
         obstacles=tuple(placed for number, placed in enumerate(rested) if number != world.target),
     )
-    start = Start(settled, rested, planner, settings, skill_goal)
+    start = EpisodeStart(settled, rested, planner, settings, skill_goal)
     if skill_goal is not None and world.granules is not None:
         granules = Granules(world.granules.positions_m(), world.granules.radius_m)
-        start.granules_in = held_by(rested, [each.object_to_world for each in rested], skill_goal.openings, granules)
+        start.granules_in = count_granules(
+            rested, [each.object_to_world for each in rested], skill_goal.openings, granules
+        )
     return start
 
 

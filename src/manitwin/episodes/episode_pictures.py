@@ -20,29 +20,29 @@ from manitwin.engine.drive import RunOptions, RunReport, drive
 from manitwin.engine.folder_recipe import FolderRecipe, FolderRecord
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.engine.recipe import Ending, Identity
-from manitwin.engine.stage import Draft, Stage, tell_part
+from manitwin.engine.stage import Draft, Stage, report_progress
 from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
 from manitwin.episodes.batch import batch_name
 from manitwin.episodes.cameras import NamedCamera, named_cameras
 from manitwin.episodes.collect import LEROBOT, any_granules, batch_folders, stored_episodes
 from manitwin.episodes.configuration import read_configuration
+from manitwin.episodes.downsampling import rows_per_frame
 from manitwin.episodes.episode_room import episode_room, granules_of
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
 from manitwin.episodes.lerobot.write import LeRobotSummary, write_lerobot
-from manitwin.episodes.lower_rates import rows_per_frame
 from manitwin.episodes.replay_pictures import EpisodeReplay, twin_drawable
 from manitwin.episodes.settings import PicturesConfig
 from manitwin.episodes.stored_episode import StoredEpisode
-from manitwin.episodes.video import EpisodesVideo
+from manitwin.episodes.video import VideoWriter
 from manitwin.errors import EpisodesError, Rejected
 from manitwin.formats.json_file import read_json_object
 from manitwin.formats.printable import printable_line
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
-from manitwin.scenes.furniture_pictures import lighting_of
+from manitwin.scenes.furniture_pictures import render_lighting
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import digests_below, sha256_of_json
@@ -54,7 +54,7 @@ PICTURES = "pictures"
 
 
 @dataclass(frozen=True)
-class BatchDrawing(Payload):
+class BatchRendering(Payload):
     """A batch whose kept episodes are to be rendered."""
 
     batch_id: str
@@ -65,7 +65,7 @@ class BatchDrawing(Payload):
         return f"pictures of {self.batch_id}"
 
     @classmethod
-    def from_json(cls, fields: Mapping[str, Any]) -> BatchDrawing:
+    def from_json(cls, fields: Mapping[str, Any]) -> BatchRendering:
         """Return the batch stored in a ledger; earlier versions stored its id as text."""
         return cls(fields["text"] if "text" in fields else fields["batch_id"])
 
@@ -100,7 +100,7 @@ class EpisodeFilmsStage:
     def _robot(self) -> Robot:
         return load_robot(self._robot_name)
 
-    def run(self, draft: Draft[BatchDrawing], folder: Path) -> dict[str, Any]:
+    def run(self, draft: Draft[BatchRendering], folder: Path) -> dict[str, Any]:
         """Write ``films/<camera>.mp4``; return the fields ``first_frames`` and ``cameras``."""
         cameras = named_cameras(self.settings.cameras, self._robot)
         first_frames: dict[str, int] = {}
@@ -109,21 +109,21 @@ class EpisodeFilmsStage:
             films = [stack.enter_context(self._film(folder / FILMS, camera)) for camera in cameras if len(file)]
             self._drawn, self._to_draw = 0, sum(self._frames(episode) for episode in file)
             for episode in file:
-                pictures = self.pictures_of(episode, cameras)
+                pictures = self.render_pictures(episode, cameras)
                 spans = [film.add(shown) for film, shown in zip(films, pictures, strict=True)]
                 first_frames[episode.attempt.episode_id] = spans[0].first_frame
         size = self.settings.size_px
         return {"first_frames": first_frames, "cameras": {each.name: each.to_json(size, size) for each in cameras}}
 
-    def _film(self, folder: Path, camera: NamedCamera) -> EpisodesVideo:
+    def _film(self, folder: Path, camera: NamedCamera) -> VideoWriter:
         size = self.settings.size_px
         path, rate_hz = folder / f"{camera.name}.mp4", self.settings.rate_hz
-        return EpisodesVideo(path, width_px=size, height_px=size, codec=self.settings.codec, rate_hz=rate_hz)
+        return VideoWriter(path, width_px=size, height_px=size, codec=self.settings.codec, rate_hz=rate_hz)
 
     def _frames(self, episode: StoredEpisode) -> int:
         return episode.recording.steps // rows_per_frame(self.settings.rate_hz)
 
-    def pictures_of(self, episode: StoredEpisode, cameras: list[NamedCamera]) -> list[list[np.ndarray]]:
+    def render_pictures(self, episode: StoredEpisode, cameras: list[NamedCamera]) -> list[list[np.ndarray]]:
         """Return the pictures ``(H, W, 3) uint8`` of each camera, one per state at the settings' rate."""
         room, size = episode_room(episode), self.settings.size_px
         pictures: list[list[np.ndarray]] = [[] for _ in cameras]
@@ -133,7 +133,7 @@ class EpisodeFilmsStage:
             furniture=room.furniture,
             fixtures=room.fixture_boxes,
             granules=granules_of(episode),
-            lighting=lighting_of(room.ambient, room.lights),
+            lighting=render_lighting(room.ambient, room.lights),
             seed=episode.attempt.seed % 2**31,
             picture_px=size,
         ) as replay:
@@ -143,7 +143,7 @@ class EpisodeFilmsStage:
                 for shown, frame in zip(pictures, frames, strict=True):
                     shown.append(frame.rgb)
                 self._drawn += 1
-                tell_part(self._drawn, self._to_draw, "frames")
+                report_progress(self._drawn, self._to_draw, "frames")
         return pictures
 
 
@@ -151,7 +151,7 @@ class EpisodeFilmsStage:
 class PicturesRecipe(FolderRecipe[PicturesRecord]):
     """Videos of the batches of ``episodes``, with twins in ``dataset`` and a robot by name or file."""
 
-    payload = BatchDrawing
+    payload = BatchRendering
     record = PICTURES_RECORD
     record_type = PicturesRecord
     can_reject = False
@@ -176,7 +176,7 @@ class PicturesRecipe(FolderRecipe[PicturesRecord]):
         """Return the folder of a batch's pictures."""
         return batch_name(item_id)
 
-    def identify(self, payload: BatchDrawing) -> Identity:
+    def identify(self, payload: BatchRendering) -> Identity:
         """Return the batch's identity."""
         return Identity(payload.batch_id, "films")
 
@@ -191,7 +191,7 @@ class PicturesRecipe(FolderRecipe[PicturesRecord]):
         shutil.copytree(draft.path(FILMS), fresh, dirs_exist_ok=True)
         fields = {name: draft.field(name) for name in ("first_frames", "cameras")}
         said = {"batch_id": draft.item_id, **fields, "files": digests_below(fresh)}
-        return self.seal(fresh, said)
+        return self.write_record(fresh, said)
 
     def ending(self, record: PicturesRecord) -> Ending:
         """Return the ending stated by a record of pictures."""
@@ -211,7 +211,7 @@ def read_pictures(folder: Path) -> PicturesRecord:
         raise EpisodesError(f"{path}: not a record of pictures ({said}); {_DRAW}") from error
 
 
-def draw_episodes(
+def render_batches(
     out: Path,
     config: PicturesConfig,
     *,
@@ -223,11 +223,11 @@ def draw_episodes(
     ``twins`` is the current location of the twins; None: that recorded with the episodes. Raises EpisodesError if there are
     no episodes, UsageError for an unknown camera.
     """
-    said = _said(out)
+    said = _run_sources(out)
     named_cameras(config.cameras, load_robot(said["robot"]))
     dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
     TwinSource(dataset)
-    drawings = (BatchDrawing(folder.name) for folder in batch_folders(out))
+    drawings = (BatchRendering(folder.name) for folder in batch_folders(out))
     recipe = PicturesRecipe(config, str(out.resolve()), dataset, said["robot"])
     return drive(
         recipe, drawings, DatasetRoot(out / PICTURES), config.run,
@@ -252,7 +252,7 @@ def write_with_pictures(out: Path, cameras: tuple[str, ...], rate_hz: int) -> Le
     return write_lerobot(stored_episodes(folders), out / LEROBOT, videos=videos, granules=granules, rate_hz=rate_hz)
 
 
-def _said(out: Path) -> dict[str, str]:
+def _run_sources(out: Path) -> dict[str, str]:
     if not os.path.lexists(out / CONFIG):
         raise EpisodesError(f"{out}/{CONFIG}: no episodes found; create some with `manitwin trajectories`")
     return read_configuration(out)

@@ -12,30 +12,30 @@ from typing import Unpack
 from manitwin.config import LARGEST_COUNT
 from manitwin.engine.drive import RunOptions, RunReport, drive
 from manitwin.engine.folder_recipe import FolderRecipe
+from manitwin.engine.ledger.integrity import ledger_damaged_error
 from manitwin.engine.ledger.location import CONFIG, local_ledger
 from manitwin.engine.ledger.reading import read_ledger
-from manitwin.engine.ledger.soundness import damaged
 from manitwin.engine.recipe import Ending, Identity
 from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
-from manitwin.episodes.batch import BATCH_RECORD, BATCH_SCHEMA_VERSION, Batch, BatchRecord, batch_name, batches
+from manitwin.episodes.batch import BATCH_RECORD, BATCH_SCHEMA_VERSION, Batch, BatchRecord, batch_name, missing_batches
 from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_source import EpisodesSource
 from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
-from manitwin.episodes.retirement import Retirement, find_retirements, retire
+from manitwin.episodes.retirement import Retirement, find_retirements, retire_grasps
 from manitwin.episodes.setting import Begins
 from manitwin.episodes.settings import TrajectoriesConfig
-from manitwin.episodes.skills.hands import check_grasps, check_hand
 from manitwin.episodes.skills.registry import load_skill
+from manitwin.episodes.skills.robot_compatibility import check_grasps, check_hand
 from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.tasks.task_files import read_tasks
 from manitwin.episodes.tasks.task_record import TaskRecord
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.json_file import parse_json_object
-from manitwin.robots.grippers.of_twins import require_same
+from manitwin.robots.grippers.twin_grippers import require_same_gripper
 from manitwin.robots.load import load_robot
-from manitwin.scenes.layouts.pool import Pool, PoolTwin, pool_of
+from manitwin.scenes.layouts.pool import Pool, PoolTwin, cached_pool
 from manitwin.scenes.run_settings import check_settings
 from manitwin.scenes.scene_files import scene_ids
 from manitwin.twin.dataset_root import DatasetRoot
@@ -101,7 +101,7 @@ class EpisodesRecipe(FolderRecipe[BatchRecord]):
             "files": files,
             **draft.field("batch"),
         }
-        return self.seal(fresh, said)
+        return self.write_record(fresh, said)
 
     def ending(self, record: BatchRecord) -> Ending:
         """Return the ending stated by a batch's record."""
@@ -166,7 +166,7 @@ def make_episodes(
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} episodes; ask for 1 or more, at most {LARGEST_COUNT}")
     skill = load_skill(config.skill)
-    source, root = EpisodesSource.of(place, twins), DatasetRoot(out)
+    source, root = EpisodesSource.detect(place, twins), DatasetRoot(out)
     _check_asked(config, source)
     tasks = [] if source.tasks is None else read_tasks(source.tasks)
     config = _with_robot_of(tasks, config)
@@ -180,21 +180,23 @@ def make_episodes(
     if source.tasks is not None:
         configuration["tasks"] = source.tasks
     check_settings(root, configuration, free=DECIDE_NO_EPISODE, made="batches of episodes")
-    there = _batches_there(root)
+    there = _scheduled_batches(root)
     _check_collectable(Path(out), there)
     try:
         if source.tasks is not None:
             ids = [task.task_id for task in tasks]
-            deal = batches(robot.name, count, config.batch, task_ids=ids, there=there)
+            deal = missing_batches(robot.name, count, config.batch, task_ids=ids, there=there)
         elif source.scenes is None:
             stage = EpisodesStage(config, source.dataset, None)
-            pool = pool_of(source.dataset)
-            require_same(robot.gripper, ((twin.twin_id, twin.grippers) for twin in pool.twins), robot.name)
+            pool = cached_pool(source.dataset)
+            require_same_gripper(robot.gripper, ((twin.twin_id, twin.grippers) for twin in pool.twins), robot.name)
             check_grasps(robot, skill, [twin.twin_id for twin in pool.twins], stage.has_grasps)
-            twin_ids = twins_for(skill, pool, stage.begins)
-            deal = batches(robot.name, count, config.batch, twin_ids=twin_ids, there=there)
+            twin_ids = twins_for(skill, pool, stage.start_placements)
+            deal = missing_batches(robot.name, count, config.batch, twin_ids=twin_ids, there=there)
         else:
-            deal = batches(robot.name, count, config.batch, scene_ids=scene_ids(Path(source.scenes)), there=there)
+            deal = missing_batches(
+                robot.name, count, config.batch, scene_ids=scene_ids(Path(source.scenes)), there=there
+            )
     except UsageError as error:
         raise UsageError(f"{root.url}: {error}") from error
     report = drive(
@@ -207,7 +209,7 @@ def make_episodes(
         report.remarks.append(f"{before} episodes exist already, more than the requested {count}; none was added")
     elif before:
         report.remarks.append(f"{before} of {count} episodes existed already")
-    if source.scenes is None and (said := pool_of(source.dataset).about_joints):
+    if source.scenes is None and (said := cached_pool(source.dataset).joints_remark):
         report.remarks.append(said)
     return report
 
@@ -234,7 +236,7 @@ def twins_for(skill: Skill | None, pool: Pool, begins: Begins) -> list[str]:
     return found
 
 
-def _batches_there(root: DatasetRoot) -> list[Batch]:
+def _scheduled_batches(root: DatasetRoot) -> list[Batch]:
     """Return the batches scheduled by earlier runs at a root."""
     path = local_ledger(root)
     if not path.is_file():
@@ -259,11 +261,11 @@ def _batch(text: str, ledger: Path) -> Batch:
     try:
         return Batch.from_json(parse_json_object(text, str(ledger), UsageError))
     except (TypeError, KeyError, AttributeError) as error:
-        raise damaged(ledger, error) from error
+        raise ledger_damaged_error(ledger, error) from error
 
 
 def retire_failing(out: Path) -> tuple[list[Retirement], int]:
     """Retire the grasps that fail according to a finished run; return them, and the number that was newly retired."""
     said = read_configuration(out)
     found = find_retirements(read_attempts(out / ATTEMPTS), failed_share=said["retire_failed_share"])
-    return found, retire(TwinSource(said["dataset"]), found)
+    return found, retire_grasps(TwinSource(said["dataset"]), found)

@@ -9,10 +9,10 @@ from pathlib import Path
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.episodes.tasks.task_files import TASKS
 from manitwin.errors import UsageError
-from manitwin.robots.grippers.of_twins import require_same
+from manitwin.robots.grippers.twin_grippers import require_same_gripper
 from manitwin.robots.robot import Robot
+from manitwin.scenes.changed_twins import require_same_twins
 from manitwin.scenes.scene_files import SCENES, read_scene, scene_ids, scene_name
-from manitwin.scenes.twins_now import require_same_twins
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.record_digests import TwinState
@@ -32,7 +32,7 @@ class EpisodesSource:
     remarks: tuple[str, ...] = field(default=(), compare=False)
 
     @classmethod
-    def of(cls, place: str | Path, twins: str | Path | None = None) -> EpisodesSource:
+    def detect(cls, place: str | Path, twins: str | Path | None = None) -> EpisodesSource:
         """Detect the kind of source.
 
         ``twins`` is the current location of the scenes' twins; None: that recorded with the layouts. Raises UsageError for an
@@ -65,7 +65,7 @@ class EpisodesSource:
 
     def check_grippers(self, robot: Robot) -> None:
         """Raise UsageError if twins of the scenes have grasps of a different gripper with the robot's gripper name."""
-        require_same(robot.gripper, ((each, state.grippers) for each, state in self.states.items()), robot.name)
+        require_same_gripper(robot.gripper, ((each, state.grippers) for each, state in self.states.items()), robot.name)
 
 
 def _check_twins(dataset: str, scenes: Path) -> tuple[dict[str, TwinState], tuple[str, ...]]:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from manitwin.config import Resource
-from manitwin.engine.stage import Draft, tell_part
+from manitwin.engine.stage import Draft, report_progress
+from manitwin.episodes.attempt_row import attempt_row
 from manitwin.episodes.attempts import ATTEMPTS, Attempt, write_attempts
 from manitwin.episodes.batch import Batch
 from manitwin.episodes.carry_tilt import carry_tilts_rad
@@ -22,11 +23,11 @@ from manitwin.episodes.goals.goal_instructions import goal_instructions
 from manitwin.episodes.hdf5_file import write_episodes
 from manitwin.episodes.instructions import episode_instructions
 from manitwin.episodes.pick_place_tasks import Placeable
-from manitwin.episodes.planning.level_space import kept_level
+from manitwin.episodes.planning.level_space import must_stay_level
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.planning.two_arms import planner_of
-from manitwin.episodes.room_for_hand import begins_that_lead_there, placement_with_room
+from manitwin.episodes.room_for_hand import feasible_start_placements, placement_with_room
 from manitwin.episodes.sealing_surface import with_surface
 from manitwin.episodes.setting import Setting, scene_setting, table_setting
 from manitwin.episodes.settings import TrajectoriesConfig
@@ -37,12 +38,11 @@ from manitwin.episodes.target_grasps import TargetGrasp, shuffled, usable_grasps
 from manitwin.episodes.tasks.task_files import read_tasks
 from manitwin.episodes.tasks.task_record import TaskRecord
 from manitwin.episodes.tasks.task_setting import TaskSetting, task_setting
-from manitwin.episodes.told_attempt import told_attempt
 from manitwin.errors import UsageError
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
-from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose, pool_of
+from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose, cached_pool
 from manitwin.scenes.loaded_scene import Scene, furniture_boxes
 from manitwin.scenes.scene_files import scene_name
 from manitwin.twin.loaded_twin import Twin, TwinSource
@@ -87,15 +87,19 @@ class EpisodesStage:
 
     @property
     def _pool(self) -> Pool:
-        return pool_of(self.dataset)
+        return cached_pool(self.dataset)
 
     def _read_placeable(self, twin_id: str) -> Placeable:
         twin, gripper = self._pool.twin(twin_id), self._robot.gripper
         if not isinstance(gripper, MultiFingerGripper):
-            return Placeable.of(self._pool, twin)
+            return Placeable.in_likeliest_placement(self._pool, twin)
         grasps = [each.grasp for each in self._grasps(twin_id).values()]
         placement = placement_with_room(twin.poses, grasps, gripper)
-        return Placeable.of(self._pool, twin) if placement is None else Placeable.in_pose(self._pool, twin, placement)
+        return (
+            Placeable.in_likeliest_placement(self._pool, twin)
+            if placement is None
+            else Placeable.in_placement(self._pool, twin, placement)
+        )
 
     def _read_twin(self, twin_id: str) -> Twin:
         return self._source.twin(twin_id)
@@ -131,7 +135,7 @@ class EpisodesStage:
                 setting = self._setting(batch, np.random.default_rng(words))
             stored = self._attempt(batch, number, seed, setting, task)
             attempts.append(stored.attempt if isinstance(stored, StoredEpisode) else stored)
-            tell_part(len(attempts), batch.count, "episodes")
+            report_progress(len(attempts), batch.count, "episodes")
             if setting is not None:
                 twins.update({o.twin_id: self._twin(o.twin_id).record.revision for o in setting.task.objects})
             if isinstance(stored, StoredEpisode):
@@ -160,7 +164,14 @@ class EpisodesStage:
         if batch.twin_id is not None:
             target = self._pool.twin(batch.twin_id)
             return table_setting(
-                skill, target, self._pool, self._placeable_of, self.settings.others, workspace, rng, self.begins
+                skill,
+                target,
+                self._pool,
+                self._placeable_of,
+                self.settings.others,
+                workspace,
+                rng,
+                self.start_placements,
             )
         assert batch.scene_id is not None and self.scenes is not None
         scene = Scene.read(Path(self.scenes) / scene_name(batch.scene_id), self.dataset)
@@ -169,9 +180,9 @@ class EpisodesStage:
     def _placeable_of(self, twin: PoolTwin) -> Placeable:
         return self._placeable(twin.twin_id)
 
-    def begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
+    def start_placements(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
         """Return the placements in which a target may start: if the goal is a placement, those from which a grasp leads there."""
-        return begins_that_lead_there(
+        return feasible_start_placements(
             skill,
             target,
             self._pool.body(target.twin_id).body,
@@ -192,7 +203,7 @@ class EpisodesStage:
         skill = self._skill_of(batch)
         episode_id = f"{batch.batch_id}-{number:08d}"
         if setting is None:
-            return told_attempt(
+            return attempt_row(
                 episode_id,
                 self._robot,
                 skill,
@@ -218,15 +229,15 @@ class EpisodesStage:
             seed=seed,
             fixtures=tuple(box for fixture in setting.fixtures for box in fixture.boxes),
             level=frozenset(
-                each.name for each in task.objects if kept_level(each, self._pool.body(each.twin_id).opening)
+                each.name for each in task.objects if must_stay_level(each, self._pool.body(each.twin_id).opening)
             ),
         )
         facts, recording = run_episode(
             problem, self._planner, self._robot, self.settings.episode, setting.skill_goal,
-            None if task_set is None else task_set.several,
+            None if task_set is None else task_set.multi_step_sequence,
         )  # fmt: skip
         spoken = self._instructions(setting, seed) if task_set is None else task_set.task.instructions
-        attempt = told_attempt(
+        attempt = attempt_row(
             episode_id, self._robot, skill, target.twin_id, twin.record.language.category, setting.scene_id, seed,
             len(problem.obstacles), facts, grasps.get(facts.grasp.grasp_id) if facts.grasp else None, spoken,
             batch.task_id,
@@ -269,7 +280,7 @@ class EpisodesStage:
             return goal_instructions(setting.skill_goal.goal.literals[0], words, seed=seed)
         return episode_instructions(
             self._language(target.twin_id),
-            *task.way_m,
+            *task.start_and_goal_m,
             seed=seed,
             others=[self._language(each.twin_id) for place, each in enumerate(task.objects) if place != task.target],
         )

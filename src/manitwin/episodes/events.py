@@ -14,7 +14,7 @@ from sapien import physx
 
 from manitwin.episodes.goals.world_state import Event
 from manitwin.geometry.poses import inverse, transform_points
-from manitwin.physics.sapien.contacts import ContactReader, Push
+from manitwin.physics.sapien.contacts import ContactReader, ResultantForce
 
 Pose = Callable[[], np.ndarray]
 """Returns a frame's current pose in the world ``(4, 4)``."""
@@ -54,7 +54,7 @@ class ContactWatch:
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
         """Process the contacts of the last step."""
-        push = reader.push(contacts, self.subject, self.by) if self.asked else None
+        push = reader.resultant_force(contacts, self.subject, self.by) if self.asked else None
         self.force_n = 0.0 if push is None else float(np.linalg.norm(push.force_n))
 
 
@@ -80,14 +80,14 @@ class PressWatch:
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
         """Process the contacts of the last step."""
-        push = reader.push(contacts, self.subject, self.by)
+        push = reader.resultant_force(contacts, self.subject, self.by)
         self.force_n = 0.0 if push is None else float(np.linalg.norm(push.force_n))
         if push is None:
             self._ended += [] if self._now is None else [self._now]
             self._now = None
         elif self._now is None or self.force_n > self._now.values["force_n"]:
             place = self.place()
-            values = {"force_n": self.force_n, **_at(push, place, -place[:3, 2]), "time_s": time_s}
+            values = {"force_n": self.force_n, **_push_offset_and_angle(push, place, -place[:3, 2]), "time_s": time_s}
             self._now = Event("pressed", self.subject, None, values)
 
 
@@ -117,14 +117,18 @@ class StrikeWatch:
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
         """Process the contacts of the last step."""
-        push, face = reader.push(contacts, self.struck, frozenset({self.tool})), self.face()
+        push, face = reader.resultant_force(contacts, self.struck, frozenset({self.tool})), self.face()
         touched_before = self.force_n > 0
         self.force_n = 0.0 if push is None else float(np.linalg.norm(push.force_n))
         if push is None:
             if self._before is not None:
                 self._speed_m_s = float((face[:3, 3] - self._before[:3, 3]) @ face[:3, 2] / self.timestep_s)
         elif not touched_before:
-            values = {**_at(push, face, face[:3, 2]), "face_radius_m": self.face_radius_m, "speed_m_s": self._speed_m_s}
+            values = {
+                **_push_offset_and_angle(push, face, face[:3, 2]),
+                "face_radius_m": self.face_radius_m,
+                "speed_m_s": self._speed_m_s,
+            }
             values |= {"force_n": self.force_n, "time_s": time_s}
             self._events.append(Event("struck", self.tool, self.struck, values))
         elif self.force_n > self._events[-1].values["force_n"]:
@@ -133,7 +137,7 @@ class StrikeWatch:
         self._before = face
 
 
-def _at(push: Push, frame_to_world: np.ndarray, along: np.ndarray) -> dict[str, float]:
+def _push_offset_and_angle(push: ResultantForce, frame_to_world: np.ndarray, along: np.ndarray) -> dict[str, float]:
     """Return the distance of a push from a frame's Z axis, and its angle to the direction ``along (3,)``."""
     at_m = transform_points(inverse(frame_to_world), push.at_m[None])[0]
     cosine = float(push.force_n @ along) / max(float(np.linalg.norm(push.force_n)), 1e-12)

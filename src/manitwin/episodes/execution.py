@@ -18,8 +18,8 @@ from manitwin.episodes.recorder import Recorder
 from manitwin.episodes.recording import RATE_HZ, Recording
 from manitwin.episodes.step_speeds import StepSpeeds
 from manitwin.geometry.poses import inverse
-from manitwin.physics.sapien.contacts import NONE_MEANT, ROBOT_NAME, MeantContacts, Touches
-from manitwin.physics.sapien.controls.control import control_of
+from manitwin.physics.sapien.contacts import NONE_MEANT, ROBOT_NAME, AllowedContacts, TargetContacts
+from manitwin.physics.sapien.controls.control import create_hand_control
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 from manitwin.robots.robot import Robot
@@ -60,14 +60,14 @@ class Execution:
         self._steps_per_look = max(1, int(WATCH_S / closing.timestep_s + 1e-9))
         self._arms = list[CommandedArm]()
         for number, (arm, tip_pose) in enumerate(zip(robot.arms or (robot,), tip_poses, strict=True)):
-            world.use(number)
+            world.select_arm(number)
             home_rad = np.array(arm.home_rad, float)
             told = replace(closing, steps_per_frame=self._steps_per_row)
             targets = JointTargets(home_rad, *world.robot.limits_rad)
-            self._arms.append(CommandedArm(tip_pose, home_rad, targets, control_of(world, told)))
-        world.use(0)
+            self._arms.append(CommandedArm(tip_pose, home_rad, targets, create_hand_control(world, told)))
+        world.select_arm(0)
         self._arm = self._arms[0]
-        self.meant: MeantContacts = NONE_MEANT
+        self.meant: AllowedContacts = NONE_MEANT
         self.watches: list[EventWatch] = []
         self.literal: int | None = None
         self.steps = 0
@@ -81,12 +81,12 @@ class Execution:
 
     def use(self, arm: int) -> None:
         """Switch to another arm, by number; ``touches`` are then those of its fingers."""
-        self._world.use(arm)
+        self._world.select_arm(arm)
         self._arm = self._arms[arm]
         self._take_touches(self._world.contacts.read())
 
     @property
-    def used(self) -> int:
+    def selected_arm(self) -> int:
         """Number of the current arm."""
         return self._arms.index(self._arm)
 
@@ -144,7 +144,7 @@ class Execution:
             self._arm.commanded_rad = target_rad
             if not self._carry_out_row(motion.phase, until):
                 if yields:
-                    self.yield_here()
+                    self.adopt_actual_joints()
                 return False
             if until_row is not None and until_row():
                 return False
@@ -161,7 +161,7 @@ class Execution:
             velocities_rad_s=np.concatenate([np.zeros((waits, positions_rad.shape[1])), velocities_rad_s]),
         )
 
-    def yield_here(self) -> None:
+    def adopt_actual_joints(self) -> None:
         """Make the actual joints the commanded ones, which releases forces on the arm."""
         self._arm.commanded_rad = self._world.robot.joint_positions()
 
@@ -174,12 +174,12 @@ class Execution:
         for _ in range(rows):
             self._carry_out_row(phase)
 
-    def shape(self, grasp: Grasp | None) -> None:
+    def shape_hand(self, grasp: Grasp | None) -> None:
         """Prepare the hand for a grasp; cups do nothing."""
         joints_rad, opening_m = (None, None) if grasp is None else (grasp.joints_rad, grasp.opening_m)
-        self._play(Phase.REACH, self._arm.hand.shaping(joints_rad, opening_m))
+        self._send_hand_commands(Phase.REACH, self._arm.hand.shaping(joints_rad, opening_m))
 
-    def close(self) -> None:
+    def close_hand(self) -> None:
         """Close the hand until it presses; it then keeps pressing with the closing force."""
         self._arm.presses, steady = True, 0
         for _ in range(round(self._closing.close_time_s * RATE_HZ)):
@@ -188,22 +188,22 @@ class Execution:
             if steady > STEADY_ROWS:
                 break
 
-    def close_empty(self) -> None:
+    def close_empty_hand(self) -> None:
         """Close the empty hand at the closing speed, without pressing."""
-        self._play(Phase.CLOSE, self._arm.hand.closing_empty())
+        self._send_hand_commands(Phase.CLOSE, self._arm.hand.closing_empty())
         self.wait_s(Phase.CLOSE, OPENING_S)
 
-    def open(self) -> None:
+    def open_hand(self) -> None:
         """Open the hand at the closing speed."""
         self._arm.presses = False
-        self._play(Phase.OPEN, self._arm.hand.opening())
+        self._send_hand_commands(Phase.OPEN, self._arm.hand.opening())
         self.wait_s(Phase.OPEN, OPENING_S)
 
     @property
     def touches_target(self) -> bool:
         """Whether any part of a robot presses on the target."""
         robots = {ROBOT_NAME, *(robot.robot.name for robot in self._world.robots)}
-        pressing = self._world.contacts.pressing(self._world.contacts.read())
+        pressing = self._world.contacts.pressing_pairs(self._world.contacts.read())
         name = self._world.placed[self._world.target].name
         return any(name in pair and pair & robots for pair in pressing)
 
@@ -215,7 +215,7 @@ class Execution:
         """Return the commanded hand pose in the object frame; the arm's tracking error counts as a pose change in the hand."""
         return inverse(self.target_to_world()) @ self._arm.tip_pose(self.commanded_rad)
 
-    def rest(self, max_steps: int, still_rows: int = STILL_ROWS) -> list[list[np.ndarray]]:
+    def wait_for_rest(self, max_steps: int, still_rows: int = STILL_ROWS) -> list[list[np.ndarray]]:
         """Wait until nothing has moved for some rows; return the poses ``(4, 4)`` of all objects in the last rows."""
         watch = self._world.rest_watch(still_rows)
         for _ in range(max_steps // self._steps_per_row):
@@ -233,7 +233,7 @@ class Execution:
     def _poses(self) -> list[np.ndarray]:
         return [self._world.object_to_world(number) for number in range(len(self._world.placed))]
 
-    def _play(self, phase: Phase, told: Iterator[np.ndarray]) -> None:
+    def _send_hand_commands(self, phase: Phase, told: Iterator[np.ndarray]) -> None:
         """Apply queued hand commands until none is left and the row ends."""
         arm = self._arm
         arm.next_told = next(told, None)
@@ -247,15 +247,15 @@ class Execution:
         ways = []
         for arm in self._arms:
             arm.commanded_rad = np.asarray(arm.commanded_rad, np.float32).astype(float)  # as recorded
-            arm.choose()
-            ways.append(arm.targets.towards(arm.commanded_rad, count))
+            arm.update_hand_command()
+            ways.append(arm.targets.interpolate_to(arm.commanded_rad, count))
         self._world.expect_load(any(arm.may_hold for arm in self._arms))
         for step in range(count):
             for arm, robot, (positions, steps) in zip(self._arms, self._world.robots, ways, strict=True):
                 # targets at the middle of the step; otherwise the arm would run ahead of them
                 velocities = steps[step] / (count * dt)
                 robot.set_targets(positions[step] - velocities * (dt / 2), velocities)
-                arm.tell(hand_share(step + 1, self._closing.steps_per_frame, count))
+                arm.set_hand_target(hand_share(step + 1, self._closing.steps_per_frame, count))
             self._advance(phase)
             if goes_on and until is not None and until():
                 goes_on = False
@@ -297,7 +297,7 @@ class Execution:
         )
         self._unplanned_since_row = False
         self._last_poses.append(self._poses())
-        self._last_pressing.append(frozenset(self._world.contacts.pressing(contacts)))
+        self._last_pressing.append(frozenset(self._world.contacts.pressing_pairs(contacts)))
 
     @property
     def _is_held(self) -> bool:
@@ -307,12 +307,12 @@ class Execution:
     def _hands_state(self) -> np.ndarray:
         return np.concatenate([arm.hand.state for arm in self._arms])
 
-    def _take_touches(self, contacts: Sequence[physx.PhysxContact]) -> Touches:
+    def _take_touches(self, contacts: Sequence[physx.PhysxContact]) -> TargetContacts:
         """Store the current arm's contact forces, and return those of all arms."""
         of_arms = [
             arm.hand.touches(reader.touches(contacts))
             for arm, reader in zip(self._arms, self._world.readers, strict=True)
         ]
-        self.touches = of_arms[self.used]
+        self.touches = of_arms[self.selected_arm]
         forces_n = tuple(force for touches in of_arms for force in touches.finger_forces_n)
         return replace(self.touches, finger_forces_n=forces_n)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from manitwin.episodes.goals.functional import cavity_holds, granules_in
+from manitwin.episodes.goals.functional import is_granule_inside, is_in_cavity
 from manitwin.episodes.goals.world_state import Granules, ObjectState
 from manitwin.episodes.recording import Recording
 from manitwin.geometry.cavity import Opening
@@ -15,7 +15,7 @@ from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.geometry.rigid_body import PlacedObject
 
 
-def held_by(
+def count_granules(
     objects: Sequence[PlacedObject],
     object_to_world: Sequence[np.ndarray],
     openings: Mapping[str, Opening],
@@ -25,7 +25,7 @@ def held_by(
     counts = {}
     for placed, pose in zip(objects, object_to_world, strict=True):
         vessel = ObjectState(placed.body, pose, pose, True, openings.get(placed.name))
-        counts[placed.name] = int(granules_in(vessel, granules).sum())
+        counts[placed.name] = int(is_granule_inside(vessel, granules).sum())
     return counts
 
 
@@ -41,6 +41,6 @@ def with_granule_counts(
             continue
         turns = rotation_from_quaternion_wxyz(recording.object_quaternions_wxyz[:, number].astype(float))
         from_origin = middles - recording.object_positions_m[:, number, None].astype(float)
-        inside = cavity_holds(opening, np.concatenate(placed.body.hulls), from_origin @ turns, radius_m)
+        inside = is_in_cavity(opening, np.concatenate(placed.body.hulls), from_origin @ turns, radius_m)
         held[:, number] = inside.sum(1)
     return replace(recording, granules_in_objects=held)

@@ -46,7 +46,7 @@ class HandoverWatch:
         """Process the contacts of the last step."""
         height_m = float(self.center()[2])
         self._start_m = height_m if self._start_m is None else self._start_m
-        pairs = (pair for pair in reader.pressing(contacts) if self.subject in pair)
+        pairs = (pair for pair in reader.pressing_pairs(contacts) if self.subject in pair)
         touching = frozenset().union(*pairs) - {self.subject}
         if self.giver in touching:
             self._given, self._values = True, {}

@@ -22,13 +22,13 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, Val
 from manitwin.episodes.attempts import Attempt, attempt_from
 from manitwin.episodes.handled_objects import handled_objects
 from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta, tip_poses
-from manitwin.episodes.recording_arrays import GRANULES, LITERAL, checked
+from manitwin.episodes.recording_arrays import GRANULES, LITERAL, checked_recording
 from manitwin.episodes.stored_episode import (
     RecordedArm,
     RecordedObject,
     RecordedRobot,
     StoredEpisode,
-    robot_from,
+    robot_from_dict,
     to_json,
 )
 from manitwin.errors import EpisodesError
@@ -36,7 +36,7 @@ from manitwin.formats.hdf5_file import Hdf5
 from manitwin.formats.json_file import parse_json_object
 from manitwin.formats.printable import printable_line
 from manitwin.robots.robot import OPENING
-from manitwin.twin.store import file_beside
+from manitwin.twin.store import atomic_file
 
 LIBVER = ("v110", "v110")
 """Small groups and single chunks need no index: a fifth smaller than the oldest format (measured with 29 arrays per episode)."""
@@ -55,18 +55,18 @@ _COMPRESSED_BYTES = 512
 """Smaller arrays are stored uncompressed, because compression would not shrink them."""
 
 
-class _Said(BaseModel):
+class _StrictModel(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
-class _SaidArm(_Said):
+class _SaidArm(_StrictModel):
     name: str = Field(pattern=_NAME)
     joints: int = Field(ge=1, le=64)
     base_position_m: list[FiniteFloat] = Field(min_length=3, max_length=3)
     base_quaternion_wxyz: list[FiniteFloat] = Field(min_length=4, max_length=4)
 
 
-class _SaidRobot(_Said):
+class _SaidRobot(_StrictModel):
     name: str = Field(pattern=_NAME)
     sha256: str
     arm_joints: list[str] = Field(min_length=1, max_length=64)
@@ -80,12 +80,12 @@ class _SaidRobot(_Said):
     arms: list[_SaidArm] = Field(default=[], max_length=2)
 
 
-class _SaidObject(_Said):
+class _SaidObject(_StrictModel):
     name: str = Field(pattern=_NAME)
     twin_id: str = Field(pattern=_NAME)
 
 
-class StoredSaid(_Said):
+class EpisodeMetadata(_StrictModel):
     """Schema of an episode's non-array data; ``attempt_from`` validates the fields of the attempt."""
 
     attempt: dict[str, Any]
@@ -104,7 +104,7 @@ def write_episodes(path: Path, episodes: Iterable[StoredEpisode]) -> int:
     Raises EpisodesError for a recording with inconsistent or non-finite arrays.
     """
     count = 0
-    with file_beside(path) as beside, h5py.File(beside, "w", libver=LIBVER) as file:
+    with atomic_file(path) as beside, h5py.File(beside, "w", libver=LIBVER) as file:
         for count, episode in enumerate(episodes, start=1):
             _write(file.create_group(f"traj_{count - 1}"), episode)
     return count
@@ -146,14 +146,14 @@ class EpisodeFile:
     def __getitem__(self, number: int) -> StoredEpisode:
         if not 0 <= number < self.count:
             raise IndexError(f"{self.path} has {self.count} episodes, not number {number}")
-        return _read(self.content, f"traj_{number}", self.said(number), f"{self.path}: traj_{number}")
+        return _read(self.content, f"traj_{number}", self.metadata(number), f"{self.path}: traj_{number}")
 
-    def said(self, number: int) -> dict[str, Any]:
+    def metadata(self, number: int) -> dict[str, Any]:
         """Return an episode's non-array data: ``attempt, robot, objects, target, facts``."""
-        return _said(self.content.text(f"traj_{number}", EPISODE), f"{self.path}: traj_{number}")
+        return _read_metadata(self.content.text(f"traj_{number}", EPISODE), f"{self.path}: traj_{number}")
 
 
-def _said(content: bytes | None, where: str) -> dict[str, Any]:
+def _read_metadata(content: bytes | None, where: str) -> dict[str, Any]:
     """Return the validated JSON of a trajectory's group; raises EpisodesError."""
     if content is None:
         raise EpisodesError(
@@ -161,7 +161,7 @@ def _said(content: bytes | None, where: str) -> dict[str, Any]:
         )
     said = parse_json_object(content, where, EpisodesError, remedy=_REMEDY)
     try:
-        StoredSaid.model_validate(said)
+        EpisodeMetadata.model_validate(said)
         _ATTEMPT.validate_json(json.dumps(said["attempt"]), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
@@ -171,7 +171,7 @@ def _said(content: bytes | None, where: str) -> dict[str, Any]:
 
 
 def _write(group: h5py.Group, episode: StoredEpisode) -> None:
-    recording = checked(episode)
+    recording = checked_recording(episode)
     steps, hand = recording.steps, _hand_joints(recording.hand, episode.robot)
     positions = np.hstack([recording.joint_positions_rad, hand])
     speeds = np.append(np.diff(hand, axis=0) * np.float32(RATE_HZ), np.zeros((1, hand.shape[1]), np.float32), axis=0)
@@ -232,7 +232,7 @@ def _articulations(robot: RecordedRobot, positions: np.ndarray, velocities: np.n
 
 
 def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> StoredEpisode:
-    robot, objects = robot_from(said["robot"]), tuple(RecordedObject(**thing) for thing in said["objects"])
+    robot, objects = robot_from_dict(said["robot"]), tuple(RecordedObject(**thing) for thing in said["objects"])
     arm = len(robot.arm_joints)
 
     def array(name: str, width: int | None = None) -> np.ndarray:

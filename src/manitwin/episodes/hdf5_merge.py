@@ -14,7 +14,7 @@ from manitwin.episodes.attempts import attempt_from
 from manitwin.episodes.hdf5_file import LIBVER, EpisodeFile
 from manitwin.episodes.recording import RATE_HZ
 from manitwin.errors import EpisodesError
-from manitwin.twin.store import file_beside
+from manitwin.twin.store import atomic_file
 
 TRAJECTORIES, METADATA = "trajectory.h5", "trajectory.json"
 
@@ -32,16 +32,16 @@ def merge_episodes(files: Iterable[Path], folder: Path) -> int:
     written atomically, the JSON last. Raises EpisodesError for a file that cannot be read.
     """
     count, longest, robots = 0, 0, dict[str, Any]()
-    with file_beside(folder / METADATA) as metadata, metadata.open("w", encoding="ascii", newline="\n") as text:
+    with atomic_file(folder / METADATA) as metadata, metadata.open("w", encoding="ascii", newline="\n") as text:
         with (
-            file_beside(folder / TRAJECTORIES) as merged,
+            atomic_file(folder / TRAJECTORIES) as merged,
             h5py.File(merged, "w", libver=LIBVER) as target,
             _listed(text, "episodes") as write,
         ):
             for path in files:
                 with EpisodeFile(path) as source:
                     for number in range(len(source)):
-                        said, group = source.said(number), source.content.group(f"traj_{number}")
+                        said, group = source.metadata(number), source.content.group(f"traj_{number}")
                         steps = source.content.length(f"traj_{number}/actions")
                         group.file.copy(group, target, name=f"traj_{count}")
                         write(_row(count, steps, said))

@@ -8,7 +8,7 @@ import numpy as np
 
 from manitwin.episodes.naming import Name, names_of
 from manitwin.errors import UsageError
-from manitwin.models.annotators.words import article
+from manitwin.models.annotators.descriptions import article
 from manitwin.twin.record import Language
 
 TEMPLATES = (

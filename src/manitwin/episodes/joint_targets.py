@@ -21,7 +21,7 @@ class JointTargets:
         self._last = np.repeat(np.asarray(start_rad, float)[None], ORDER, axis=0)
         self._lowest, self._highest = lowest_rad, highest_rad
 
-    def towards(self, target_rad: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    def interpolate_to(self, target_rad: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Return targets ``(count, n)`` rad at uniform times up to the step's end, and speeds.
 
         The last target is ``target_rad (n,)``. Speeds ``(count, n)`` are in rad per step, 0 for joints at their limits.

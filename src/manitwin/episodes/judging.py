@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from manitwin.episodes.courses.course import Start
+from manitwin.episodes.courses.course import EpisodeStart
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.execution import REST_ROWS, Execution
 from manitwin.episodes.goals.evaluation import evaluate
@@ -22,17 +22,17 @@ points.
 """
 
 
-def is_reached_already(start: Start, world: RobotWorld) -> bool:
+def is_reached_already(start: EpisodeStart, world: RobotWorld) -> bool:
     """Tell whether any literal of the goal is true at the start."""
     if start.skill_goal is None:
         return False
-    touching = frozenset(world.contacts.pressing(world.contacts.read()))
+    touching = frozenset(world.contacts.pressing_pairs(world.contacts.read()))
     state = state_of(start, world, [each.object_to_world for each in start.objects], touching)
     return bool(evaluate(state, start.skill_goal.goal).true_already)
 
 
 def state_of(
-    start: Start,
+    start: EpisodeStart,
     world: RobotWorld,
     object_to_world: Sequence[np.ndarray],
     touching: frozenset[frozenset[str]],
@@ -68,20 +68,20 @@ def state_of(
 
 
 def judge(
-    start: Start, goal_object_to_world: np.ndarray, facts: EpisodeFacts, world: RobotWorld, execution: Execution
+    start: EpisodeStart, goal_object_to_world: np.ndarray, facts: EpisodeFacts, world: RobotWorld, execution: Execution
 ) -> None:
     """Wait until everything is at rest, and set the outcome."""
     settings, target = start.settings, start.objects[world.target]
     if start.skill_goal is not None and max(execution.touches.finger_forces_n) == 0:
-        last = execution.rest(round(max(settings.max_rest_s, SWINGS_S) / settings.timestep_s), REST_ROWS)
+        last = execution.wait_for_rest(round(max(settings.max_rest_s, SWINGS_S) / settings.timestep_s), REST_ROWS)
     else:
-        last = execution.rest(round(settings.max_rest_s / settings.timestep_s), REST_ROWS)
+        last = execution.wait_for_rest(round(settings.max_rest_s / settings.timestep_s), REST_ROWS)
     errors = placement_errors(execution.target_to_world(), goal_object_to_world, target.body.center_of_mass_m)
     at_rest = [
         is_at_rest([row[number] for row in last], placed.body.center_of_mass_m, settings)
         for number, placed in enumerate(world.placed)
     ]
-    if start.skill_goal is None or not start.skill_goal.is_of_a_path:
+    if start.skill_goal is None or not start.skill_goal.has_path:
         facts.errors = errors
     if start.skill_goal is None:
         released = max(execution.touches.finger_forces_n) == 0
@@ -101,7 +101,7 @@ def judge(
     facts.outcome = failure or "kept"
 
 
-def _is_disturbed(start: Start, placed: PlacedObject, after: np.ndarray) -> bool:
+def _is_disturbed(start: EpisodeStart, placed: PlacedObject, after: np.ndarray) -> bool:
     """Tell whether an uninvolved object moved; a partner, which the target is placed on or into, has a larger tolerance."""
     settings, center = start.settings, placed.body.center_of_mass_m
     goal = start.skill_goal

@@ -12,20 +12,20 @@ from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
 from manitwin.episodes.target_grasps import usable_grasps
 from manitwin.geometry.poses import inverse
 from manitwin.scenes.loaded_scene import furniture_boxes
-from manitwin.scenes.locate.carried_grasps import CarriedGrasps
 from manitwin.scenes.locate.located_objects import LocatedObject
+from manitwin.scenes.locate.transferred_grasps import TransferredGrasps
 from manitwin.scenes.locate.world_frame import WorldFrame
 from manitwin.scenes.scene import Furniture
 
 
 def with_reach(
-    carried: CarriedGrasps,
+    carried: TransferredGrasps,
     number: int,
     objects: Sequence[LocatedObject],
     furniture: Furniture,
     world: WorldFrame,
     planner: PickPlacePlanner,
-) -> CarriedGrasps:
+) -> TransferredGrasps:
     """Return the free grasps of ``objects[number]`` with their reachability, reachable ones first.
 
     A grasp is reachable if the arm can take it without collision with table, boxes, other located objects and the object
@@ -51,7 +51,7 @@ def with_reach(
         obstacles=tuple(each.placed for place, each in enumerate(objects) if place != number),
         static_boxes=tuple(furniture_boxes(furniture)),
     )
-    told = dict(zip((each.grasp_id for each in known), planner.reached(problem), strict=True))
+    told = dict(zip((each.grasp_id for each in known), planner.reachable_grasps(problem), strict=True))
     found = [replace(each, reached=told.get(each.grasp_id, False)) for each in carried.grasps]
     found.sort(key=lambda each: not each.reached)
     return replace(carried, grasps=tuple(found), robot=robot.name)

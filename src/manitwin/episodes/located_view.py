@@ -12,16 +12,16 @@ import numpy as np
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform_points
 from manitwin.robots.grippers.gripper import Gripper
-from manitwin.scenes.locate.carried_frames import CarriedPlacement, carry_placements
-from manitwin.scenes.locate.carried_grasps import CarriedGrasps, carry_grasps
 from manitwin.scenes.locate.depth_view import DepthView, measured_noise_m
 from manitwin.scenes.locate.layout_files import NoLayout
 from manitwin.scenes.locate.located_furniture import located_furniture
 from manitwin.scenes.locate.located_objects import LocatedObject, located_objects
 from manitwin.scenes.locate.located_scene import LocatedScene, located_scene
 from manitwin.scenes.locate.proposals import Plane, table_plane
-from manitwin.scenes.locate.recognition import Thing
-from manitwin.scenes.locate.world_frame import WorldFrame, world_of_base, world_of_table
+from manitwin.scenes.locate.recognition import ViewedObject
+from manitwin.scenes.locate.transferred_frames import TransferredPlacement, transfer_placements
+from manitwin.scenes.locate.transferred_grasps import TransferredGrasps, transfer_grasps
+from manitwin.scenes.locate.world_frame import WorldFrame, base_world_frame, table_world_frame
 from manitwin.scenes.scene import Furniture
 from manitwin.twin.loaded_twin import Twin
 
@@ -40,7 +40,7 @@ class LocatedView:
     def __init__(
         self,
         view: DepthView,
-        things: Sequence[tuple[Thing, Twin]],
+        things: Sequence[tuple[ViewedObject, Twin]],
         camera_to_base: np.ndarray | None = None,
         robot: str | None = None,
         seed: int = 0,
@@ -71,10 +71,10 @@ class LocatedView:
         ]
         about = np.mean(middles, axis=0)
         if self._camera_to_base is None:
-            return world_of_table(self.plane, about)
-        return world_of_base(self._camera_to_base, self.plane, about)
+            return table_world_frame(self.plane, about)
+        return base_world_frame(self._camera_to_base, self.plane, about)
 
-    def grasps(self, number: int) -> CarriedGrasps | None:
+    def grasps(self, number: int) -> TransferredGrasps | None:
         """Return the collision-free grasps of an object where it was located, with a robot also their reachability.
 
         None if it was not located, or if its twin has no grasps for jaws. Raises UsageError if no table is seen.
@@ -85,7 +85,7 @@ class LocatedView:
         except UsageError as error:
             raise UsageError(f"--grasps: {error} (the hand has to keep clear of the table)") from error
         noise_m = measured_noise_m(self.view, np.ones(self.view.depth_m.shape, bool))
-        carried = carry_grasps(thing, twin, self.view, plane, noise_m, self._grippers)
+        carried = transfer_grasps(thing, twin, self.view, plane, noise_m, self._grippers)
         if carried is None or self._planner is None:
             return carried
         from manitwin.episodes.located_reach import with_reach
@@ -93,11 +93,11 @@ class LocatedView:
         place = sum(bool(each.location.poses) for each, _ in self.things[:number])
         return with_reach(carried, place, self._objects, self._furniture, self.world, self._planner)
 
-    def placements(self, number: int) -> tuple[CarriedPlacement, ...]:
+    def placements(self, number: int) -> tuple[TransferredPlacement, ...]:
         """Return the resting poses of an object on the table, where it was located."""
         thing, twin = self.things[number]
         noise_m = measured_noise_m(self.view, np.ones(self.view.depth_m.shape, bool))
-        return carry_placements(thing, twin, self.view, self.plane, noise_m)
+        return transfer_placements(thing, twin, self.view, self.plane, noise_m)
 
     @cached_property
     def scene(self) -> LocatedScene | NoLayout:
@@ -121,7 +121,7 @@ class LocatedView:
 def _planner_of(robot: str) -> PickPlacePlanner:
     """Return the planner of a robot; raises UsageError for one without jaws, Unavailable if planning is not installed."""
     from manitwin.episodes.planning.pick_place import PickPlacePlanner
-    from manitwin.episodes.skills.hands import check_jaws
+    from manitwin.episodes.skills.robot_compatibility import check_jaws
     from manitwin.robots.load import load_robot
 
     loaded = load_robot(robot)

@@ -6,9 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from manitwin.models.annotators.prior_names import counter_of, lookup, normalised
-from manitwin.models.annotators.words import joined
-from manitwin.scenes.vqa.nouns import names_cut_down
+from manitwin.models.annotators.descriptions import joined
+from manitwin.models.annotators.prior_names import counter_phrase, find_prior, normalise_name
+from manitwin.scenes.vqa.nouns import with_shortened_names
 from manitwin.twin.record import Language
 
 NAMELESS = "object"
@@ -47,7 +47,7 @@ class Name:
 
 
 @dataclass(frozen=True)
-class _Told:
+class _NameParts:
     """Usable parts of a twin's language record; None if a part is not usable. ``nouns``: further nouns that may denote it."""
 
     noun: str
@@ -64,36 +64,36 @@ class _Told:
 
 def names_of(language: Language, others: Sequence[Language] = ()) -> list[Name]:
     """Return the names of an object, simplest first; names that also fit one of the others only if all do."""
-    told = _told(language)
+    told = _name_parts(language)
     names = _names(told)
-    beside = [_told(other) for other in others]
-    own = [name for name in names if not any(_fits(name, told, other) for other in beside)]
+    beside = [_name_parts(other) for other in others]
+    own = [name for name in names if not any(_could_refer_to(name, told, other) for other in beside)]
     if own:
         return own
     most = max(len(name.uses) for name in names)
     return [name for name in names if len(name.uses) == most]
 
 
-def tells_apart(language: Language, others: Sequence[Language]) -> bool:
+def is_distinguishable(language: Language, others: Sequence[Language]) -> bool:
     """Tell whether an object has a name that fits none of the others."""
-    told, beside = _told(language), [_told(other) for other in others]
-    return any(not any(_fits(name, told, other) for other in beside) for name in _names(told))
+    told, beside = _name_parts(language), [_name_parts(other) for other in others]
+    return any(not any(_could_refer_to(name, told, other) for other in beside) for name in _names(told))
 
 
-def called(category: str) -> frozenset[str]:
+def category_names(category: str) -> frozenset[str]:
     """Return what people may call a thing of a category: its name, those that the priors know for it, and what these end with."""
-    prior = lookup(category)
-    return names_cut_down((category, *(prior.aliases if prior is not None else ())))
+    prior = find_prior(category)
+    return with_shortened_names((category, *(prior.aliases if prior is not None else ())))
 
 
-def _names(told: _Told) -> list[Name]:
+def _names(told: _NameParts) -> list[Name]:
     ways: list[tuple[str | None, tuple[str, ...]]] = [
         (told.noun, ()),
-        (_before(told, "color"), ("color",)),
-        (_before(told, "material"), ("material",)),
-        (_before(told, "color", "material"), ("color", "material")),
-        (_before(told, "size"), ("size",)),
-        (_before(told, "size", "color"), ("size", "color")),
+        (_with_adjectives(told, "color"), ("color",)),
+        (_with_adjectives(told, "material"), ("material",)),
+        (_with_adjectives(told, "color", "material"), ("color", "material")),
+        (_with_adjectives(told, "size"), ("size",)),
+        (_with_adjectives(told, "size", "color"), ("size", "color")),
         (told.use and f"{told.noun} for {told.use}", ("use",)),
         (told.part and f"{told.noun} with {told.part}", ("part",)),
         (told.caption, ("caption",)),
@@ -105,13 +105,13 @@ def _names(told: _Told) -> list[Name]:
     return list(named.values())
 
 
-def _before(told: _Told, *attributes: str) -> str | None:
+def _with_adjectives(told: _NameParts, *attributes: str) -> str | None:
     """Return the noun preceded by attributes; None if an attribute is not usable."""
     said = [getattr(told, attribute) for attribute in attributes]
     return None if None in said else " ".join([*said, told.noun])
 
 
-def _fits(name: Name, told: _Told, other: _Told) -> bool:
+def _could_refer_to(name: Name, told: _NameParts, other: _NameParts) -> bool:
     """Tell whether a name could also refer to another object: "the cup" to a measuring cup or a mug.
 
     Objects with different nouns are distinguished by visible attributes only, because their records may omit uses and parts.
@@ -122,20 +122,20 @@ def _fits(name: Name, told: _Told, other: _Told) -> bool:
     return told.noun in other.nouns and all(getattr(other, each) == getattr(told, each) for each in seen)
 
 
-def _told(language: Language) -> _Told:
-    category = normalised(language.category).removeprefix("pair of ")
-    prior = lookup(category)
+def _name_parts(language: Language) -> _NameParts:
+    category = normalise_name(language.category).removeprefix("pair of ")
+    prior = find_prior(category)
     if not _PLAIN.fullmatch(category) or _UNSAID.search(category):
         category, prior = NAMELESS, None
     counter = prior.counter if prior is not None else None
     in_pairs = counter == "pair of"
     plural = in_pairs or (counter is None and _is_plural(category))
-    said = None if prior is None or in_pairs else counter_of(prior, category)
+    said = None if prior is None or in_pairs else counter_phrase(prior, category)
     noun = category if said is None else f"{said} {category}"
     edible = prior is not None and prior.surface == "food skin"
-    return _Told(
+    return _NameParts(
         noun=noun,
-        nouns=called(category),
+        nouns=category_names(category),
         plural=plural,
         in_pairs=in_pairs,
         color=_color(language.color),

@@ -36,7 +36,7 @@ class Placeable:
     object_to_plane: np.ndarray
 
     @classmethod
-    def of(cls, pool: Pool, twin: PoolTwin) -> Placeable:
+    def in_likeliest_placement(cls, pool: Pool, twin: PoolTwin) -> Placeable:
         """Use the most probable stable placement, preferably an upright one."""
         best = max(twin.poses, key=lambda pose: (pose.upright, pose.probability))
         return cls(twin.twin_id, pool.body(twin.twin_id).body, best.object_to_plane)
@@ -46,12 +46,12 @@ class Placeable:
         """Vertices ``(K, 2)`` of its footprint on the plane, in the placement's frame."""
         return footprint(transform_points(self.object_to_plane, np.concatenate(self.body.hulls)))
 
-    def at(self, plane_to_world: np.ndarray) -> np.ndarray:
+    def pose_at(self, plane_to_world: np.ndarray) -> np.ndarray:
         """Return the object's pose for a pose ``(4, 4)`` of the placement's frame."""
         return plane_to_world @ self.object_to_plane
 
     @classmethod
-    def in_pose(cls, pool: Pool, twin: PoolTwin, pose: StandingPose) -> Placeable:
+    def in_placement(cls, pool: Pool, twin: PoolTwin, pose: StandingPose) -> Placeable:
         """Use the given stable placement."""
         return cls(twin.twin_id, pool.body(twin.twin_id).body, pose.object_to_plane)
 
@@ -65,7 +65,7 @@ class PickPlaceTask:
     goal_object_to_world: np.ndarray
 
     @property
-    def way_m(self) -> tuple[np.ndarray, np.ndarray]:
+    def start_and_goal_m(self) -> tuple[np.ndarray, np.ndarray]:
         """Where the target's centre of mass is at the beginning and at the goal, ``(3,)`` each: what a person sees move.
 
         The origin of its frame does not tell: that of a bottle that lies is at an end, and goes another way where it is turned.
@@ -81,7 +81,7 @@ class PlacingArea:
     workspace: Workspace
     support: SupportRegion
 
-    def wider(self) -> PlacingArea:
+    def widened(self) -> PlacingArea:
         """Return the larger area for objects that need not be reached."""
         workspace = self.workspace
         wide = Workspace(
@@ -91,27 +91,29 @@ class PlacingArea:
         )
         return PlacingArea(wide, self.support)
 
-    def beyond(self) -> PlacingArea:
+    def extended(self) -> PlacingArea:
         """Return the area where an arm may be able to put an object down: wider, and closer to its base; planning decides."""
-        workspace = self.wider().workspace
+        workspace = self.widened().workspace
         return PlacingArea(replace(workspace, min_radius_m=workspace.min_radius_m * NEARER_RADIUS_FACTOR), self.support)
 
-    def draw(self, corners: np.ndarray, taken: Sequence[np.ndarray], rng: np.random.Generator) -> np.ndarray | None:
+    def sample_pose(
+        self, corners: np.ndarray, taken: Sequence[np.ndarray], rng: np.random.Generator
+    ) -> np.ndarray | None:
         """Sample a pose for a footprint ``(K, 2)`` that is clear of the ``taken`` ones; None if none was found."""
         for _ in range(POSES_TRIED):
             pose = _pose(self.workspace, rng)
-            if self.holds(_at(corners, pose)) and _clear(_at(corners, pose), taken):
+            if self.contains_footprint(_at(corners, pose)) and _clear(_at(corners, pose), taken):
                 return pose
         return None
 
-    def reaches(self, position_m: np.ndarray, corners: np.ndarray) -> bool:
+    def is_reachable(self, position_m: np.ndarray, corners: np.ndarray) -> bool:
         """Tell whether a position ``(2,)`` is in the workspace, and a footprint ``(K, 2)`` entirely on the surface."""
         workspace, radius_m = self.workspace, float(np.linalg.norm(position_m))
         angle_rad = abs(float(np.arctan2(position_m[1], position_m[0])))
         in_reach = workspace.min_radius_m <= radius_m <= workspace.max_radius_m
-        return in_reach and angle_rad <= workspace.half_angle_rad and self.holds(corners)
+        return in_reach and angle_rad <= workspace.half_angle_rad and self.contains_footprint(corners)
 
-    def holds(self, corners: np.ndarray) -> bool:
+    def contains_footprint(self, corners: np.ndarray) -> bool:
         """Tell whether a footprint ``(K, 2)`` is entirely on the surface, and clear of the arm's base."""
         inside = np.abs(corners - self.support.center_m) <= self.support.half_extents_m
         # no vertex may overlap the arm's base, whatever the distance of the object's centre
@@ -127,15 +129,15 @@ def sample_task(
     Neither start nor goal is closer than ``MIN_GAP_M`` to another object.
     """
     for _ in range(OTHERS_TRIED):
-        start = area.draw(target.footprint, [], rng)
+        start = area.sample_pose(target.footprint, [], rng)
         middle_m = transform_points(target.object_to_plane, target.body.center_of_mass_m[None])[0]
         goal = None if start is None else _elsewhere(target.footprint, middle_m, start, [], area, rng)
         if start is None or goal is None:
             continue
-        around = _others(others, count, [_at(target.footprint, pose) for pose in (start, goal)], area.wider(), rng)
+        around = _others(others, count, [_at(target.footprint, pose) for pose in (start, goal)], area.widened(), rng)
         if around is not None:
-            first = PlacedObject("object_00", target.twin_id, target.body, target.at(start))
-            return PickPlaceTask((first, *around), 0, target.at(goal))
+            first = PlacedObject("object_00", target.twin_id, target.body, target.pose_at(start))
+            return PickPlaceTask((first, *around), 0, target.pose_at(goal))
     return None
 
 
@@ -150,14 +152,14 @@ def sample_objects(
     for _ in range(OTHERS_TRIED):
         taken, placed = list[np.ndarray](), list[PlacedObject]()
         for number, each in enumerate(taking_part):
-            pose = area.draw(each.footprint, taken, rng)
+            pose = area.sample_pose(each.footprint, taken, rng)
             if pose is None:
                 break
             taken.append(_at(each.footprint, pose))
-            placed.append(PlacedObject(f"object_{number:02d}", each.twin_id, each.body, each.at(pose)))
+            placed.append(PlacedObject(f"object_{number:02d}", each.twin_id, each.body, each.pose_at(pose)))
         if len(placed) < len(taking_part):
             continue
-        around = _others(others, count, taken, area.wider(), rng, first=len(placed))
+        around = _others(others, count, taken, area.widened(), rng, first=len(placed))
         if around is not None:
             return (*placed, *around)
     return None
@@ -210,7 +212,7 @@ def free_poses(
     """Yield up to ``count`` free poses of a body in a placement ``(4, 4)``, clear of the ``taken`` footprints."""
     corners = footprint_at(body, object_to_plane)
     for _ in range(count):
-        pose = area.draw(corners, taken, rng)
+        pose = area.sample_pose(corners, taken, rng)
         if pose is None:
             return
         pose[2, 3] += area.support.height_m
@@ -227,7 +229,7 @@ def _elsewhere(
 ) -> np.ndarray | None:
     """Draw a free pose in which the middle ``(3,)`` of a footprint, in its own frame, is far enough from where it is ``here``."""
     for _ in range(POSES_TRIED):
-        pose = area.draw(corners, taken, rng)
+        pose = area.sample_pose(corners, taken, rng)
         if pose is None:
             return None
         way_m = transform_points(pose, middle_m[None]) - transform_points(here, middle_m[None])
@@ -247,11 +249,11 @@ def _others(
     taken, placed = list(kept_free), []
     for number in range(count):
         other = others()
-        pose = area.draw(other.footprint, taken, rng)
+        pose = area.sample_pose(other.footprint, taken, rng)
         if pose is None:
             return None
         taken.append(_at(other.footprint, pose))
-        placed.append(PlacedObject(f"object_{number + first:02d}", other.twin_id, other.body, other.at(pose)))
+        placed.append(PlacedObject(f"object_{number + first:02d}", other.twin_id, other.body, other.pose_at(pose)))
     return placed
 
 

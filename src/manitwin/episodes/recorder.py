@@ -11,7 +11,7 @@ from manitwin.episodes.planning.problem import Phase
 from manitwin.episodes.recording import Recording
 from manitwin.episodes.step_speeds import Speeds
 from manitwin.geometry.poses import quaternion_wxyz, without_sign_changes
-from manitwin.physics.sapien.contacts import Touches
+from manitwin.physics.sapien.contacts import TargetContacts
 from manitwin.physics.sapien.world import RobotWorld
 
 
@@ -37,7 +37,7 @@ class _Action(NamedTuple):
 class Recorder:
     """Records the first state, then each action with the resulting state; values of the first of two arms come first."""
 
-    def __init__(self, world: RobotWorld, touches: Touches, hand: np.ndarray):
+    def __init__(self, world: RobotWorld, touches: TargetContacts, hand: np.ndarray):
         """Record the first state; ``hand (h,)`` is the hand's position."""
         self._world = world
         joints = sum(len(each.robot.arm_joints) for each in world.robots)
@@ -56,7 +56,7 @@ class Recorder:
         hand: np.ndarray,
         phase: Phase,
         speeds: Speeds,
-        touches: Touches,
+        touches: TargetContacts,
         *,
         unplanned: bool,
         literal: int | None = None,

@@ -26,12 +26,12 @@ LITERAL = "active_literal"
 _OF_ACTIONS = ("phase", LITERAL)
 
 
-def is_of_actions(name: str) -> bool:
+def is_per_action(name: str) -> bool:
     """Tell whether an array of a recording has a row per action ``(T, ...)`` instead of per state ``(T + 1, ...)``."""
     return name.startswith("action_") or name in _OF_ACTIONS
 
 
-def checked(episode: StoredEpisode) -> Recording:
+def checked_recording(episode: StoredEpisode) -> Recording:
     """Return the recording with the file's types: float32, phases uint8, flags bool.
 
     Raises EpisodesError for inconsistent shapes, non-finite values, or an invalid target.
@@ -49,7 +49,7 @@ def checked(episode: StoredEpisode) -> Recording:
         if entry.name in (*GRANULES, LITERAL) and getattr(recording, entry.name) is None:
             continue
         array = np.asarray(getattr(recording, entry.name))
-        rows = steps if is_of_actions(entry.name) else steps + 1
+        rows = steps if is_per_action(entry.name) else steps + 1
         shape = (rows, *_widths(episode.robot, things, recording).get(entry.name, ()))
         if array.shape != shape:
             raise EpisodesError(

@@ -12,20 +12,20 @@ import trimesh
 
 from manitwin.episodes.cameras import NamedCamera
 from manitwin.episodes.recording import Recording
-from manitwin.episodes.robot_looks import link_drawables
+from manitwin.episodes.robot_appearance import link_drawables
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import StaticBox
-from manitwin.render.drawable import Drawable, drawable
+from manitwin.render.drawable import Drawable, prepare_drawable
 from manitwin.render.procedural_textures import procedural_texture, textured_box
 from manitwin.render.scene_lighting import STUDIO, Lighting
 from manitwin.render.scene_renderer import SceneFrame, SceneRenderer, ShadowRegion
-from manitwin.robots.links import links_of_urdf, poses_at
+from manitwin.robots.links import poses_at, read_urdf_links
 from manitwin.robots.robot import Robot
 from manitwin.robots.urdf import UrdfTree
 from manitwin.scenes.furniture_pictures import TEXTURE_VARIANTS, add_furniture
 from manitwin.scenes.scene import Furniture, SurfaceBox
-from manitwin.scenes.twin_looks import simplified_twin_looks
+from manitwin.scenes.twin_surfaces import simplified_twin_drawable
 
 FINE_PX = 640
 FINEST_M = 0.0008
@@ -54,7 +54,7 @@ def link_poses(robot: Robot, joint_positions_rad: np.ndarray, hand: np.ndarray) 
     """
     joints = dict(zip(robot.arm_joints, np.asarray(joint_positions_rad, float), strict=False))
     joints.update(zip(robot.finger_joints, robot.hand_joints(np.asarray(hand, float)).tolist(), strict=True))
-    return poses_at(links_of_urdf(robot.urdf), joints)
+    return poses_at(read_urdf_links(robot.urdf), joints)
 
 
 def link_tolerance_m(picture_px: int) -> float:
@@ -69,7 +69,7 @@ def object_tolerance_m(picture_px: int, most_m: float = MOST_OF_OBJECTS_M) -> fl
 
 def twin_drawable(folder: Path, picture_px: int = FINE_PX) -> Drawable:
     """Return a twin's appearance, simplified for pictures of at most ``picture_px``; cached. Raises TwinError."""
-    return simplified_twin_looks(folder, object_tolerance_m(picture_px))
+    return simplified_twin_drawable(folder, object_tolerance_m(picture_px))
 
 
 class EpisodeReplay:
@@ -99,7 +99,7 @@ class EpisodeReplay:
         self._renderer = SceneRenderer(lighting, shadows=ShadowRegion().for_pictures_of(picture_px))
         self._objects = [f"object_{index:02d}" for index in range(len(objects))]
         for name, thing in zip(self._objects, objects, strict=True):
-            ready = thing if isinstance(thing, Drawable) else drawable(thing, tolerance_m=FINEST_M)
+            ready = thing if isinstance(thing, Drawable) else prepare_drawable(thing, tolerance_m=FINEST_M)
             self._renderer.add(name, ready)
         fingers = _moved_by(robot.urdf, robot.finger_joints)
         of_fingers_m = object_tolerance_m(picture_px, MOST_OF_FINGERS_M)
@@ -215,4 +215,4 @@ def _sphere(radius_m: float) -> Drawable:
         baseColorFactor=GRANULE_RGBA, roughnessFactor=0.8, metallicFactor=0.0
     )
     sphere.visual = trimesh.visual.TextureVisuals(material=material)
-    return drawable([sphere])
+    return prepare_drawable([sphere])

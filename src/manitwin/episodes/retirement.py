@@ -21,9 +21,9 @@ from manitwin.episodes.attempts import EXECUTION_FAILURES, Attempt
 from manitwin.episodes.settings import HANDOVER
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.grasp_table import read_grasp_table
+from manitwin.twin.integrity import write_sizes
 from manitwin.twin.loaded_twin import TwinSource
-from manitwin.twin.store import amend, read_record
-from manitwin.twin.wholeness import note_sizes
+from manitwin.twin.store import read_record, replace_files
 
 GRASPS = "grasps.parquet"
 
@@ -67,7 +67,7 @@ def find_retirements(attempts: Iterable[Attempt], *, failed_share: float) -> lis
     ]
 
 
-def retire(twins: TwinSource, found: Iterable[Retirement]) -> int:
+def retire_grasps(twins: TwinSource, found: Iterable[Retirement]) -> int:
     """Mark grasps as retired in their twins' tables; return the number of newly retired ones.
 
     A data set's ledger and index are updated, and reviews of those twins are kept. Raises UsageError for a data set at a URL,
@@ -84,13 +84,15 @@ def retire(twins: TwinSource, found: Iterable[Retirement]) -> int:
         if fresh:
             count += fresh
             seen = read_record(folder).revision
-            amended = amend(folder, {GRASPS: _with_column(table, "retired", after)}, partial(note_sizes, folder))
+            amended = replace_files(
+                folder, {GRASPS: _with_column(table, "retired", after)}, partial(write_sizes, folder)
+            )
             revised[twin_id] = seen, amended.revision
     if revised and twins.root.exists(LEDGER):
         _follow(twins.root, {twin_id: revision for twin_id, (_, revision) in revised.items()})
     if revised and twins.root.exists(REVIEWS):
         with ReviewStore(reviews_path(twins.root)) as store:  # reviews do not concern grasps that fail with an arm
-            store.follow(revised)
+            store.record_successors(revised)
     return count
 
 
@@ -113,9 +115,9 @@ def _follow(root: DatasetRoot, revisions: dict[str, str]) -> None:
     ledger = Ledger(root.local / LEDGER)
     try:
         for twin_id, revision in revisions.items():
-            ledger.revised(twin_id, revision)
+            ledger.record_revision(twin_id, revision)
         if root.exists("index"):
             write_part(root, revisions)
-            ledger.indexed(revisions)
+            ledger.mark_indexed(revisions)
     finally:
         ledger.close()

@@ -7,11 +7,11 @@ from functools import cache
 
 import numpy as np
 
+from manitwin.episodes.grasp_stability import LEAST_APART_M, any_orientation_loads, bears_weight, pad_distances_m
 from manitwin.episodes.planning.grasp_candidates import CLOSED
 from manitwin.episodes.planning.placement import DROP_M
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.skill import Skill
-from manitwin.episodes.steady_grasps import LEAST_APART_M, bears_weight, loads_any_way_up, pad_distances_m
 from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody
 from manitwin.robots.grippers.gripper import Gripper
@@ -37,21 +37,21 @@ def placement_with_room(
     return None
 
 
-def begins_that_lead_there(
+def feasible_start_placements(
     skill: Skill, target: PoolTwin, body: RigidBody, grasps: Callable[[], Sequence[Grasp]], gripper: Gripper
 ) -> Sequence[StandingPose]:
     """Return the placements in which a target may start with a skill.
 
-    If the skill ends in a placement, those of ``begins_with_room``; if it needs two arms, those of ``begins_for_two_hands``.
-    ``grasps`` is only called in these cases.
+    If the skill ends in a placement, those of ``start_placements_with_room``; if it needs two arms, those of
+    ``handover_start_placements``. ``grasps`` is only called in these cases.
     """
     begins, ends = skill.begins_in(target), skill.ends_in(target)
     if skill.arms == 2:
-        return begins_for_two_hands(begins, target.poses, grasps(), gripper, body)
-    return begins_with_room(begins, ends, target.poses, grasps(), gripper, body) if ends else begins
+        return handover_start_placements(begins, target.poses, grasps(), gripper, body)
+    return start_placements_with_room(begins, ends, target.poses, grasps(), gripper, body) if ends else begins
 
 
-def begins_with_room(
+def start_placements_with_room(
     begins: Sequence[StandingPose],
     ends: Sequence[StandingPose],
     ways: Sequence[StandingPose],
@@ -78,7 +78,7 @@ def begins_with_room(
     return [begin for begin in begins if lifted(begin) & (at_ends | half_way)]
 
 
-def begins_for_two_hands(
+def handover_start_placements(
     begins: Sequence[StandingPose],
     ends: Sequence[StandingPose],
     grasps: Sequence[Grasp],
@@ -91,7 +91,7 @@ def begins_for_two_hands(
     first has room in the start placement, the second there or in one of ``ends`` (from 3 mm higher, where it may release).
     Only the plane is considered, neither the arms nor the clearance between the hands.
     """
-    loads = loads_any_way_up(grasps, body, gripper)
+    loads = any_orientation_loads(grasps, body, gripper)
     bearing = [number for number, load in enumerate(loads) if load is not None]
     has_room, lets_go = _room_over_plane(grasps, gripper), _room_over_plane(grasps, gripper, CLEARANCE_M - DROP_M)
     likely = [pose for pose in ends if pose.probability >= LEAST_LIKELY]

@@ -8,7 +8,7 @@ from itertools import chain, islice
 
 import numpy as np
 
-from manitwin.episodes.courses.course import Course, Ended, Start
+from manitwin.episodes.courses.course import Course, EpisodeEnded, EpisodeStart
 from manitwin.episodes.courses.handover import HandoverCourse
 from manitwin.episodes.courses.held import HeldCourse
 from manitwin.episodes.courses.pick_place import PickPlaceCourse
@@ -20,8 +20,8 @@ from manitwin.episodes.goals.evaluation import evaluate
 from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
-from manitwin.episodes.planning.two_arms import TwoArmPlanner, alone
-from manitwin.episodes.skills.skill import FoundPoses, Skill, SkillGoal, Surroundings, state_at_rest
+from manitwin.episodes.planning.two_arms import TwoArmPlanner, single_arm_planner
+from manitwin.episodes.skills.skill import LazyPoses, Skill, SkillGoal, Surroundings, state_at_rest
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.contacts import NONE_MEANT
 from manitwin.physics.sapien.world import RobotWorld
@@ -30,7 +30,7 @@ DRAWS = 12  # draws of a later step's poses: the intersection of two sides is a 
 
 
 @dataclass(frozen=True)
-class Step:
+class GoalStep:
     """One literal: the skill that achieves it, the names of target and partner, and the grasps.
 
     ``goal`` is set before execution, for the expected poses: its fixtures are in the world from the beginning, its poses are
@@ -48,13 +48,13 @@ class Step:
 class GoalSequence:
     """The steps of a goal in order, and the initial surroundings of their objects."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[GoalStep, ...]
     around: tuple[Surroundings, ...]
 
     @property
     def goal(self) -> SkillGoal:
         """The combined goal, by which the episode is judged."""
-        return merged([step.goal for step in self.steps])
+        return conjunction([step.goal for step in self.steps])
 
     @property
     def moved(self) -> frozenset[str]:
@@ -67,7 +67,7 @@ class GoalSequence:
         return frozenset(step.partner for step in self.steps if step.partner is not None)
 
 
-def merged(goals: Sequence[SkillGoal]) -> SkillGoal:
+def conjunction(goals: Sequence[SkillGoal]) -> SkillGoal:
     """Return the conjunction of goals: literals in order, unique ``stays`` literals, and all data for judging them."""
     literals = tuple(literal for each in goals for literal in each.goal.literals)
     stays = tuple(dict.fromkeys(stay for each in goals for stay in each.goal.stays))
@@ -85,22 +85,22 @@ def merged(goals: Sequence[SkillGoal]) -> SkillGoal:
     )
 
 
-def course_of(start: Start, facts: EpisodeFacts) -> Course:
+def create_course(start: EpisodeStart, facts: EpisodeFacts) -> Course:
     """Return the course of a start's goal; for two arms, single-arm tasks are done by the first."""
     if start.skill_goal is not None and start.skill_goal.hands_over:
         return HandoverCourse(start, facts)
     if isinstance(start.planner, TwoArmPlanner):
-        start = replace(start, planner=start.planner.alone)
+        start = replace(start, planner=start.planner.giver_planner)
     if start.skill_goal is not None and start.skill_goal.pushes:
         return PushCourse(start, facts)
-    if start.skill_goal is not None and start.skill_goal.is_of_a_path:
+    if start.skill_goal is not None and start.skill_goal.has_path:
         return HeldCourse(start, facts)
     regrasps = start.skill_goal is not None and start.skill_goal.ways is not None
     return (RegraspCourse if regrasps else PickPlaceCourse)(start, facts)
 
 
 def later_courses(
-    sequence: GoalSequence, start: Start, world: RobotWorld, execution: Execution, facts: EpisodeFacts
+    sequence: GoalSequence, start: EpisodeStart, world: RobotWorld, execution: Execution, facts: EpisodeFacts
 ) -> Iterator[Course]:
     """Yield the courses of the steps after the first, each planned once the previous one has been executed."""
     for number in range(1, len(sequence.steps)):
@@ -108,32 +108,37 @@ def later_courses(
 
 
 def _next_course(
-    sequence: GoalSequence, number: int, start: Start, world: RobotWorld, execution: Execution, facts: EpisodeFacts
+    sequence: GoalSequence,
+    number: int,
+    start: EpisodeStart,
+    world: RobotWorld,
+    execution: Execution,
+    facts: EpisodeFacts,
 ) -> Course:
     """Let everything settle, bring the arm home, and plan a later step from the current poses; raises Ended if that fails."""
     settings, planner, step, around = start.settings, start.planner, sequence.steps[number], sequence.around[number]
-    execution.rest(round(settings.max_rest_s / settings.timestep_s))
+    execution.wait_for_rest(round(settings.max_rest_s / settings.timestep_s))
     objects = tuple(
         replace(placed, object_to_world=world.object_to_world(place)) for place, placed in enumerate(world.placed)
     )
     target = [each.name for each in objects].index(step.target)
     problem = problem_of(start.problem, objects, target, step.grasps)
     execution.meant = NONE_MEANT
-    execution.open()
+    execution.open_hand()
     assert isinstance(planner, PickPlacePlanner), "sequences are planned with the models of this planner"
-    home = alone(planner).of(facts.grasp).plan_way_home(problem, execution.commanded_rad)
+    home = single_arm_planner(planner).with_opening_of(facts.grasp).plan_return_home(problem, execution.commanded_rad)
     if home is None:
-        raise Ended("replan_failed")
+        raise EpisodeEnded("replan_failed")
     execution.follow(home)
-    world.take(target)
+    world.set_target(target)
     execution.literal = number
     goal = goal_of_later_step(sequence.steps, number, replace(around, objects=objects), problem.seed)
     if goal is None:
-        raise Ended("replan_failed")
-    later = Start(problem, objects, planner, settings, goal, start.granules_in)
-    course = course_of(later, facts)
+        raise EpisodeEnded("replan_failed")
+    later = EpisodeStart(problem, objects, planner, settings, goal, start.granules_in)
+    course = create_course(later, facts)
     if not course.plan():
-        raise Ended("replan_failed")
+        raise EpisodeEnded("replan_failed")
     return course
 
 
@@ -150,7 +155,7 @@ def problem_of(
     )
 
 
-def goal_of_later_step(steps: Sequence[Step], number: int, around: Surroundings, seed: int) -> SkillGoal | None:
+def goal_of_later_step(steps: Sequence[GoalStep], number: int, around: Surroundings, seed: int) -> SkillGoal | None:
     """Return a later step's goal with poses from the current state; None if there is no pose.
 
     A target that is moved a second time only gets poses at which its earlier literals remain true, for example an object that
@@ -158,19 +163,19 @@ def goal_of_later_step(steps: Sequence[Step], number: int, around: Surroundings,
     """
     step, names = steps[number], [each.name for each in around.objects]
     target = names.index(step.target)
-    if step.goal.is_of_a_path:
+    if step.goal.has_path:
         return replace(step.goal, poses=(around.objects[target].object_to_world,))
     partner = None if step.partner is None else names.index(step.partner)
     kept = [each for before in steps[:number] if before.target == step.target for each in before.goal.goal.literals]
     goals = (
-        step.skill.set_goal(around, target, partner, np.random.default_rng((seed, 4, *([draw] if draw else []))))
+        step.skill.sample_goal(around, target, partner, np.random.default_rng((seed, 4, *([draw] if draw else []))))
         for draw in range(DRAWS if kept else 1)
     )
     first = next(goals)
     if first is None:
         return None
     every = (pose for goal in chain([first], goals) if goal is not None for pose in goal.poses)
-    poses = FoundPoses(islice((pose for pose in every if _stays(kept, around, target, pose)), step.skill.most_poses))
+    poses = LazyPoses(islice((pose for pose in every if _stays(kept, around, target, pose)), step.skill.most_poses))
     return None if next(iter(poses), None) is None else replace(first, goal=step.goal.goal, poses=poses)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.episodes.fixtures import Fixture
-from manitwin.episodes.goals.goal_instructions import tells_fixture
+from manitwin.episodes.goals.goal_instructions import is_fixture_unambiguous
 from manitwin.episodes.pick_place_tasks import (
     PickPlaceTask,
     Placeable,
@@ -81,7 +81,7 @@ def table_setting(
         around = Surroundings(objects, pool, area, tuple(furniture_boxes(furniture)))
         if not _tells_fixture(skill, around, 0):
             continue
-        found = skill.set_goal(around, 0, 1 if skill.has_partner else None, rng)
+        found = skill.sample_goal(around, 0, 1 if skill.has_partner else None, rng)
         if found is not None:
             return Setting(PickPlaceTask(objects, 0, found.poses[0]), furniture, ambient, lights, None, found)
     return None
@@ -122,7 +122,7 @@ def scene_setting(
         if not _tells_fixture(skill, around, target):
             continue
         for partner in _partners(skill, around, target, rng):
-            found = skill.set_goal(around, target, partner, rng)
+            found = skill.sample_goal(around, target, partner, rng)
             if found is not None:
                 task = PickPlaceTask(objects, target, found.poses[0])
                 return Setting(task, record.furniture, record.ambient, record.lights, scene.record.scene_id, found)
@@ -139,7 +139,7 @@ def _taking_part(
 ) -> list[Placeable] | None:
     if not begins or (not skill.has_partner and not skill.suits(pool, target, None)):
         return None
-    first = Placeable.in_pose(pool, target, begins[int(rng.integers(len(begins)))])
+    first = Placeable.in_placement(pool, target, begins[int(rng.integers(len(begins)))])
     if not skill.has_partner:
         return [first]
     for number in rng.permutation(len(pool.twins))[:PARTNERS_TRIED]:
@@ -151,7 +151,7 @@ def _taking_part(
 
 def _tells_fixture(skill: Skill, around: Surroundings, target: int) -> bool:
     others = (around.twin(number).category for number in range(len(around.objects)) if number != target)
-    return tells_fixture(skill.predicate, others)
+    return is_fixture_unambiguous(skill.predicate, others)
 
 
 def _partners(skill: Skill, around: Surroundings, target: int, rng: np.random.Generator) -> Sequence[int | None]:

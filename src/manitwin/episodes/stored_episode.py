@@ -122,7 +122,7 @@ def to_json(episode: StoredEpisode) -> str:
     return json.dumps(said, sort_keys=True, allow_nan=False, separators=(",", ":"))
 
 
-def robot_from(said: dict[str, Any]) -> RecordedRobot:
+def robot_from_dict(said: dict[str, Any]) -> RecordedRobot:
     """Return the robot given by a dict of its fields."""
     fields: dict[str, Any] = {n: tuple(value) if isinstance(value, list) else value for n, value in said.items()}
     fields["arms"] = tuple(

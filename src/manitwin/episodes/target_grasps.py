@@ -11,8 +11,8 @@ from manitwin.episodes.planning.problem import Grasp
 from manitwin.geometry.poses import transform
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
-from manitwin.robots.grippers.of_twins import require_same
 from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.robots.grippers.twin_grippers import require_same_gripper
 from manitwin.twin.grasp_table import JOINTS
 from manitwin.twin.loaded_twin import Grasps, Twin
 
@@ -43,7 +43,7 @@ def usable_grasps(twin: Twin, gripper: Gripper) -> tuple[TargetGrasp, ...]:
     is one of jaws is read from its row, because the file of a custom gripper may not be available. Raises UsageError if the
     twin has grasps of a different gripper with this gripper's name.
     """
-    require_same(gripper, [(twin.record.twin_id, _digest_of(twin, gripper.name))])
+    require_same_gripper(gripper, [(twin.record.twin_id, _digest_of(twin, gripper.name))])
     for name in _sources(twin, gripper):
         if found := _of_gripper(twin, name, gripper):
             return found

@@ -63,7 +63,7 @@ class PushWatch:
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
         """Process the contacts of the last step."""
-        push, self._now = reader.push(contacts, self.subject, self.by), (center := self.center())
+        push, self._now = reader.resultant_force(contacts, self.subject, self.by), (center := self.center())
         self.force_n = 0.0 if push is None else float(np.linalg.norm(push.force_n))
         self._touched = self._touched or self.force_n > 0
         self._start = center if self._start is None else self._start
@@ -164,7 +164,7 @@ class WipeWatch:
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
         """Record the force, and the cells under the face."""
-        push = reader.push(contacts, self.tool, frozenset({self.surface}))
+        push = reader.resultant_force(contacts, self.tool, frozenset({self.surface}))
         self._recent.append(0.0 if push is None else float(np.linalg.norm(push.force_n)))
         self.force_n = float(np.mean(self._recent))
         if not any(self._recent):

@@ -12,9 +12,9 @@ from types import TracebackType
 import numpy as np
 from PIL import Image
 
-from manitwin.episodes.film_encoders import CODECS, Codec, missing_encoder, opened_encoder
 from manitwin.episodes.recording import RATE_HZ
-from manitwin.errors import UsageError, choose_from
+from manitwin.episodes.video_encoders import CODECS, Codec, missing_encoder, open_encoder
+from manitwin.errors import UsageError, unknown_name_message
 
 ANIMATIONS = (".webp", ".gif")
 
@@ -32,7 +32,7 @@ def require_encoder(codec: Codec) -> None:
     """Raise UsageError, naming suitable builds, if a codec cannot be encoded here; there is no fallback."""
     _require_codec(codec)
     with tempfile.TemporaryDirectory(prefix="manitwin-encoder-") as folder:
-        encoder = opened_encoder(codec, Path(folder) / "a.mp4", 64, 64, RATE_HZ)
+        encoder = open_encoder(codec, Path(folder) / "a.mp4", 64, 64, RATE_HZ)
         if encoder is None:
             raise missing_encoder(codec)
         encoder.write(np.zeros((64, 64, 3), np.uint8))
@@ -41,10 +41,10 @@ def require_encoder(codec: Codec) -> None:
 
 def _require_codec(codec: str) -> None:
     if codec not in CODECS:
-        raise UsageError(choose_from("video codec", codec, CODECS))
+        raise UsageError(unknown_name_message("video codec", codec, CODECS))
 
 
-class EpisodesVideo:
+class VideoWriter:
     """An mp4 of consecutive episodes at ``rate_hz`` pictures per second. Use it in a ``with`` statement.
 
     ``av1`` and ``vp9`` play in browsers; ``vp9`` takes ten times as long, and also plays in older ones. ``mpeg4`` takes a
@@ -64,13 +64,13 @@ class EpisodesVideo:
         self._path, self._shape, self._frames = path, (height_px, width_px, 3), 0
         self._unfinished = path.with_name(f".{path.stem}.{os.getpid()}.mp4")
         path.parent.mkdir(parents=True, exist_ok=True)
-        encoder = opened_encoder(codec, self._unfinished, width_px, height_px, rate_hz)
+        encoder = open_encoder(codec, self._unfinished, width_px, height_px, rate_hz)
         if encoder is None:
             require_encoder(codec)
             raise UsageError(f"{path}: no video can be written there; check the folder and the disk")
         self._encoder = encoder
 
-    def __enter__(self) -> EpisodesVideo:
+    def __enter__(self) -> VideoWriter:
         return self
 
     def __exit__(

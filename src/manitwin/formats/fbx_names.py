@@ -19,7 +19,7 @@ def fbx_file_names(data: bytes) -> Iterator[str]:
         while at >= 0:
             name = _value_at(data, at + len(key))
             if name:
-                yield beside(name)
+                yield relative_name(name)
             at = data.find(key, at + len(key))
 
 
@@ -33,12 +33,12 @@ def embedded_files(data: bytes) -> dict[str, bytes]:
         named = max(data.rfind(key, max(0, at - _LONGEST_NAME), at) + len(key) for key in _OF_A_PICTURE)
         name = _value_at(data, named - 1)
         if name and 0 < length <= len(data) - start:
-            found[beside(name).rpartition("/")[2]] = data[start : start + length]
+            found[relative_name(name).rpartition("/")[2]] = data[start : start + length]
         at = data.find(_CONTENT, start)
     return found
 
 
-def beside(name: str) -> str:
+def relative_name(name: str) -> str:
     """Return the path of a named file relative to the folder of the mesh.
 
     An absolute path, or one that leaves the folder, is reduced to its last part.

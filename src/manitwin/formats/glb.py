@@ -18,7 +18,7 @@ from manitwin.formats.meshes.gltf import read_gltf
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
 from manitwin.formats.meshes.textures import bake_transform, make_part, material_of, normals_of, uv_of
 from manitwin.geometry.poses import GLTF_TO_OBJECT, OBJECT_TO_GLTF
-from manitwin.geometry.seams import close_seams, has_three_places
+from manitwin.geometry.seams import close_seams, has_distinct_corners
 
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125  # glTF 2.0, section 3.6.2.2
 _ARRAY_BUFFER, _ELEMENT_BUFFER = 34962, 34963
@@ -68,7 +68,7 @@ def unpack_glb(glb: bytes) -> tuple[dict[str, Any], bytes]:
 
 
 def _without_seam_faces(part: trimesh.Trimesh) -> trimesh.Trimesh:
-    keep = has_three_places(np.asarray(part.vertices), np.asarray(part.faces))
+    keep = has_distinct_corners(np.asarray(part.vertices), np.asarray(part.faces))
     if keep.all():
         return part
     return make_part(

@@ -42,7 +42,7 @@ def missing_libraries(folder: Path) -> list[str]:
     under a longer name (``libx.so.2`` as ``libx.so.2.0.1``).
     """
     objects = list(elf_files(folder))
-    bundled = {part for path in objects for part in _names_answered(path.name)}
+    bundled = {part for path in objects for part in _provided_names(path.name)}
     wanted: set[str] = set()
     for start in range(0, len(objects), AT_A_TIME):
         said = subprocess.run(["ldd", *map(str, objects[start : start + AT_A_TIME])], capture_output=True, text=True)
@@ -61,7 +61,7 @@ def import_remedy(error: ImportError, otherwise: str) -> str:
 
 
 @dataclass(frozen=True)
-class _LeftOut:
+class _BlockedImport:
     """Import finder that reports a library as not installed."""
 
     name: str
@@ -73,13 +73,13 @@ class _LeftOut:
 
 
 @contextmanager
-def left_out(name: str) -> Iterator[None]:
+def block_import(name: str) -> Iterator[None]:
     """Make imports of a library fail in the ``with`` statement as if it were not installed; a loaded one stays available.
 
     Meant for an optional dependency of another library that costs memory and is not used. A None in ``sys.modules`` would
     suffice for Python's own imports, but Cython modules (pyarrow) take it for the library.
     """
-    finder = _LeftOut(name)
+    finder = _BlockedImport(name)
     sys.meta_path.insert(0, finder)
     try:
         yield
@@ -87,7 +87,7 @@ def left_out(name: str) -> Iterator[None]:
         sys.meta_path.remove(finder)
 
 
-class _PutOff(ModuleType):
+class _LazyModule(ModuleType):
     """A module that is executed on the first access to an attribute."""
 
     def __getattr__(self, name: str) -> Any:
@@ -102,7 +102,7 @@ class _PutOff(ModuleType):
         return getattr(self, name)
 
 
-def put_off(name: str, *classes: str) -> None:
+def defer_import(name: str, *classes: str) -> None:
     """Defer loading of a library until something of it is used, instead of when another one imports it.
 
     A library that is loaded or missing stays so. ``classes`` are those that the other library imports for its annotations; they
@@ -114,7 +114,7 @@ def put_off(name: str, *classes: str) -> None:
     if spec is None or spec.loader is None:
         return
     module = module_from_spec(spec)
-    module.__class__ = _PutOff
+    module.__class__ = _LazyModule
     for each in classes:
         setattr(module, each, type(each, (), {}))
     sys.modules[name] = module
@@ -133,7 +133,7 @@ def elf_files(folder: Path) -> Iterator[Path]:
                     yield path
 
 
-def _names_answered(name: str) -> list[str]:
+def _provided_names(name: str) -> list[str]:
     """Return the library names that a file can provide: ``libx.so.2.0.1`` also ``libx.so.2`` and ``libx.so``."""
     base, dot_so, version = name.partition(".so")
     parts = version.split(".")

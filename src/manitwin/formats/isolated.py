@@ -51,7 +51,7 @@ class ProcessCrashed(Exception):
     """A call crashed its process."""
 
 
-class TookTooLong(ProcessCrashed):
+class ProcessTimeout(ProcessCrashed):
     """A call exceeded its time limit, and its process was killed."""
 
 
@@ -73,7 +73,9 @@ def run_isolated(function: str, *arguments: Any, limits: Limits = DEFAULT_LIMITS
     ProcessCrashed if the process has ended.
     """
     with _lock:
-        returned, value = next(_asked(function, [arguments], limits, one_by_one=True), (False, _crashed(function)))
+        returned, value = next(
+            _call_worker(function, [arguments], limits, one_by_one=True), (False, _crashed(function))
+        )
     if not returned:
         raise value
     return value
@@ -90,14 +92,14 @@ def iterate_isolated(
     waiting = iter(arguments)
     while chunk := list(islice(waiting, _CHUNK)):
         with _lock:
-            answers = list(_asked(function, [(each,) for each in chunk], limits))
+            answers = list(_call_worker(function, [(each,) for each in chunk], limits))
             # the call that caused a crash is unknown, so that unanswered ones are repeated one by one
             while len(answers) < len(chunk):
-                answers += _asked(function, [(each,) for each in chunk[len(answers) :]], limits, one_by_one=True)
+                answers += _call_worker(function, [(each,) for each in chunk[len(answers) :]], limits, one_by_one=True)
         yield from zip(chunk, answers, strict=True)
 
 
-def _asked(
+def _call_worker(
     function: str, calls: list[tuple[Any, ...]], limits: Limits, *, one_by_one: bool = False
 ) -> Iterator[Answer]:
     """Yield answers to calls until all are answered or the process ends; with ``one_by_one``, the last one is the cause."""
@@ -118,7 +120,7 @@ def _asked(
             left -= len(answers)
             yield from answers
     except TimeoutError:
-        error = TookTooLong(f"{function} took longer than {limits.seconds:g} s")
+        error = ProcessTimeout(f"{function} took longer than {limits.seconds:g} s")
     except BrokenPipeError:
         pass  # it ended before it received the call
     finally:
@@ -245,7 +247,7 @@ def limit_address_space(memory_bytes: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (allowed, hard))
 
 
-def called(function: str, arguments: tuple[Any, ...]) -> Any:
+def call_function(function: str, arguments: tuple[Any, ...]) -> Any:
     """Return the result of ``package.module:function`` in this process."""
     module, _, name = function.partition(":")
     return getattr(import_module(module), name)(*arguments)
@@ -269,7 +271,7 @@ def _received(stream: IO[bytes]) -> Any:
 
 def _answer(function: str, arguments: tuple[Any, ...]) -> Answer:
     try:
-        return True, called(function, arguments)
+        return True, call_function(function, arguments)
     except Exception as error:
         error.add_note(traceback.format_exc())
         try:

@@ -90,14 +90,14 @@ def _parsed(content: memoryview, wanted: str | None) -> OnnxFile:
         raise _Broken("it has no nodes or no output")
     names = [tensor.name for tensor in tensors[_GRAPH_OUTPUT]]
     kept = names.index(wanted) if wanted in names else 0
-    body = [*_in_order(nodes, names[kept]), *others, told[kept]]
+    body = [*_sort_topologically(nodes, names[kept]), *others, told[kept]]
     head = _varint_bytes(_MODEL_GRAPH << 3 | _BYTES) + _varint_bytes(sum(len(part) for part in body))
     parts: list[Any] = [content[:begin], head, *body, content[end:]]
     inputs = tuple(tensor for tensor in tensors[_GRAPH_INPUT] if tensor.name not in weights)
     return OnnxFile(b"".join(parts), inputs, tuple(tensors[_GRAPH_OUTPUT]))
 
 
-def _in_order(nodes: list[tuple[list[str], list[str], memoryview]], output: str) -> list[memoryview]:
+def _sort_topologically(nodes: list[tuple[list[str], list[str], memoryview]], output: str) -> list[memoryview]:
     """Return the nodes that ``output`` needs in topological order, otherwise keeping their order (Kahn 1962)."""
     maker = {name: index for index, (_, outputs, _) in enumerate(nodes) for name in outputs if name}
     waits = [

@@ -32,7 +32,7 @@ def require_mask(path: Path, folder: Path | None, size_px: tuple[int, int], orie
     ``size_px`` is the width and height of the upright photo. A mask of the photo as stored is also accepted if its EXIF
     ``orientation`` is a quarter turn. Only the header is read.
     """
-    called = _called(path)
+    called = _shown_name(path)
     try:
         is_inside = folder is None or path.resolve().is_relative_to(folder.resolve())
         is_there = path.is_file()
@@ -58,7 +58,7 @@ def read_mask(path: Path, shape: tuple[int, int], orientation: int = 1) -> np.nd
     a picture that is no object mask: one with several colours, one that numbers several objects, one that is nearly constant,
     and one that covers most of the border (a mask of what to exclude from a scene).
     """
-    pixels, called = read_image(path).pixels, _called(path)
+    pixels, called = read_image(path).pixels, _shown_name(path)
     if pixels.shape[2] == 4 and np.ptp(pixels[..., 3]):
         mask = pixels[..., 3]
     else:
@@ -67,7 +67,7 @@ def read_mask(path: Path, shape: tuple[int, int], orientation: int = 1) -> np.nd
             raise _refused(
                 f"{called}: a mask with several colours; give one that is white where the thing is and black elsewhere"
             )
-        _require_one_thing(mask, called)
+        _require_single_level(mask, called)
     if orientation in _TURNED and (mask.shape[0] > mask.shape[1]) != (shape[0] > shape[1]):
         mask = np.rot90(mask, _TURNED[orientation])
     highest = int(mask.max())
@@ -97,7 +97,7 @@ def _spread_of_colour(pixels: np.ndarray, mask: np.ndarray) -> float:
     return max(float(np.ptp(pixels[..., channel][bright] * full)) for channel in range(3))
 
 
-def _require_one_thing(mask: np.ndarray, called: str) -> None:
+def _require_single_level(mask: np.ndarray, called: str) -> None:
     """Raise InputError for a picture with areas at several levels: a map of several numbered objects."""
     counts = np.bincount(mask.ravel(), minlength=256)
     counts[0] = 0
@@ -117,5 +117,5 @@ def _require_one_thing(mask: np.ndarray, called: str) -> None:
         )
 
 
-def _called(path: Path) -> str:
+def _shown_name(path: Path) -> str:
     return printable_line("/".join(path.parts[-2:]), max_characters=120)

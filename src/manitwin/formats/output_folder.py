@@ -23,7 +23,7 @@ def require_writable_folder(folder: Path, what: str = "") -> None:
         for place in (folder, *folder.absolute().parents):
             if place.is_dir():
                 _require_names(folder, place)
-                _try(place, made=place != folder)
+                _require_writable(place, made=place != folder)
                 return
             if os.path.lexists(place) and not place.is_symlink():
                 raise UsageError(f"{folder}: {_named(place, folder)}a file; {remedy}")
@@ -70,7 +70,7 @@ def _require_names(folder: Path, there: Path) -> None:
         raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
 
 
-def _try(place: Path, *, made: bool) -> None:
+def _require_writable(place: Path, *, made: bool) -> None:
     """Raise OSError if a folder cannot be written; ``made``: or if no folder can be made in it (/proc)."""
     if made:
         os.rmdir(tempfile.mkdtemp(prefix=".manitwin-", dir=place))

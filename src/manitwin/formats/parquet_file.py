@@ -70,15 +70,15 @@ class ParquetTable:
                 if groups is None
                 else self._file.read_row_groups(groups, columns=names, use_threads=False)
             )
-            self._hold_texts(table)
+            self._check_text_size(table)
             plain = table.cast(_plain(table.schema))
             plain.validate(full=True)  # checks that texts are UTF-8, which pyarrow otherwise does only on access
             return plain
 
-    def _hold_texts(self, table: pa.Table) -> None:
+    def _check_text_size(self, table: pa.Table) -> None:
         """Refuse texts that expand to more than the limit."""
         for name, column in zip(table.column_names, table.columns, strict=True):
-            total = sum(_unfolded_bytes(chunk) for chunk in column.chunks)
+            total = sum(_expanded_bytes(chunk) for chunk in column.chunks)
             if total > self._max_bytes:
                 raise self._unreadable(f"{name} unfolds to {total} bytes, more than the limit of {self._max_bytes}")
 
@@ -197,10 +197,10 @@ def _plain_type(kind: pa.DataType) -> pa.DataType:
     return kind
 
 
-def _unfolded_bytes(array: pa.Array) -> int:
+def _expanded_bytes(array: pa.Array) -> int:
     """Return the size of an array's texts after expanding its dictionaries."""
     if pa.types.is_list(array.type):
-        return _unfolded_bytes(array.flatten())
+        return _expanded_bytes(array.flatten())
     if not pa.types.is_dictionary(array.type):
         return int(array.nbytes)
     lengths = pc.binary_length(array.dictionary).cast(pa.int64())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TypeGuard
 
 
-def of_newer_schema(place: object, version: int, newest: int) -> str:
+def newer_schema_message(place: object, version: int, newest: int) -> str:
     """Return the error message for a file whose schema only a newer version of this package knows."""
     return f"{place}: of schema {version}, this version reads up to {newest}; use the version that wrote it, or a newer one"
 

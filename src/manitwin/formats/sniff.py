@@ -96,7 +96,7 @@ def sniff(path: Path) -> Sniffed:
         return Sniffed("mesh", mesh)
     if not_read is not None:
         raise InputError("wrong_type", f"{called}: {not_read}")
-    if told := told_of_no_file_itself(head):
+    if told := placeholder_description(head):
         raise InputError("wrong_type", f"{called}: {told}")
     raise InputError(
         "wrong_type",
@@ -105,7 +105,7 @@ def sniff(path: Path) -> Sniffed:
     )
 
 
-def told_of_no_file_itself(head: bytes) -> str | None:
+def placeholder_description(head: bytes) -> str | None:
     """Return what a placeholder (a Git LFS pointer, a web page) with these first bytes is, and a remedy; else None."""
     return next((told for begin, told in _NO_FILE_ITSELF if begin.match(head)), None)
 

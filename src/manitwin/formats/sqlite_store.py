@@ -34,7 +34,7 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
 
 
 @contextmanager
-def errors_named(path: Path, refusal: str) -> Iterator[None]:
+def name_file_in_errors(path: Path, refusal: str) -> Iterator[None]:
     """Convert SQLite's errors in the block to UsageError naming the file; ``refusal`` is as for ``damaged``."""
     try:
         yield
@@ -42,15 +42,15 @@ def errors_named(path: Path, refusal: str) -> Iterator[None]:
         said = printable_line(str(error), max_characters=MOST_SAID)
         raise UsageError(f"{path}: {said}; mend the disk or its permissions, and try again") from error
     except (sqlite3.DatabaseError, sqlite3.InterfaceError, UnicodeDecodeError) as error:
-        raise damaged(path, error, refusal) from error
+        raise damaged_file_error(path, error, refusal) from error
 
 
-def damaged(path: Path, cause: object, refusal: str) -> UsageError:
+def damaged_file_error(path: Path, cause: object, refusal: str) -> UsageError:
     """Return the error of an unreadable file; ``refusal`` is its message, with {cause} in place of the cause."""
     return UsageError(f"{path}: {refusal.format(cause=printable_line(str(cause), max_characters=MOST_SAID))}")
 
 
-def flaw_in(
+def schema_flaw(
     connection: sqlite3.Connection, make: Callable[[sqlite3.Connection], object], *, tables_of: str
 ) -> str | None:
     """Return what is wrong with a database that should have the schema that ``make`` creates; None if nothing is."""

@@ -14,7 +14,7 @@ from manitwin.formats.printable import printable_line
 MAX_MEMBERS = 10_000
 
 
-class _TooMuch(Exception):
+class _SizeExceeded(Exception):
     pass
 
 
@@ -29,7 +29,7 @@ class _Unpacked:
         content = self._stream.read(min(size, self._left + 1))
         self._left -= len(content)
         if self._left < 0:
-            raise _TooMuch
+            raise _SizeExceeded
         return content
 
 
@@ -63,7 +63,7 @@ def read_members(
                         )
                     content = archive.extractfile(member)
                     found[member.name] = b"" if content is None else content.read(limit)
-        except _TooMuch:
+        except _SizeExceeded:
             raise too_much from None
         except (tarfile.TarError, zlib.error, EOFError, OSError, ValueError) as error:
             cause = printable_line(str(error) or type(error).__name__, max_characters=120)

@@ -48,7 +48,7 @@ class _Tensor:
     strides: tuple[int, ...]
 
 
-class _OnlyTensors(pickle.Unpickler):
+class _TensorUnpickler(pickle.Unpickler):
     """Unpickler that creates only numbers, strings, ordered dictionaries and descriptions of tensors, and calls nothing else."""
 
     def find_class(self, module: str, name: str) -> Any:
@@ -85,10 +85,10 @@ def parse_torch_checkpoint(content: bytes, name: str, refuse: Refusal) -> dict[s
     called = printable_line(name)
     stream = io.BytesIO(content)
     try:
-        if (_OnlyTensors(stream).load(), _OnlyTensors(stream).load()) != (MAGIC, PROTOCOL):
+        if (_TensorUnpickler(stream).load(), _TensorUnpickler(stream).load()) != (MAGIC, PROTOCOL):
             raise ValueError("another magic number or protocol")
-        _OnlyTensors(stream).load()
-        state, keys = _OnlyTensors(stream).load(), _OnlyTensors(stream).load()
+        _TensorUnpickler(stream).load()
+        state, keys = _TensorUnpickler(stream).load(), _TensorUnpickler(stream).load()
         tensors = {str(key): value for key, value in state.items() if isinstance(value, _Tensor)}
         if not isinstance(keys, list) or not 0 < len(tensors) <= MOST_TENSORS:
             raise ValueError(f"it holds {len(tensors)} tensors")
@@ -102,15 +102,15 @@ def parse_torch_checkpoint(content: bytes, name: str, refuse: Refusal) -> dict[s
 def _storages(stream: io.BytesIO, keys: list[Any], dtypes: dict[str, str]) -> dict[str, np.ndarray]:
     storages = {}
     for key in map(str, keys):
-        (count,) = struct.unpack("<q", _exactly(stream.read, 8))
+        (count,) = struct.unpack("<q", _read_exactly(stream.read, 8))
         dtype = np.dtype(dtypes[key])
         if not 0 <= count <= len(stream.getbuffer()) // dtype.itemsize:
             raise ValueError(f"a storage of {count} elements")
-        storages[key] = np.frombuffer(_exactly(stream.read, count * dtype.itemsize), dtype)
+        storages[key] = np.frombuffer(_read_exactly(stream.read, count * dtype.itemsize), dtype)
     return storages
 
 
-def _exactly(read: Callable[[int], bytes], count: int) -> bytes:
+def _read_exactly(read: Callable[[int], bytes], count: int) -> bytes:
     content = read(count)
     if len(content) != count:
         raise EOFError("it ends early")

@@ -164,7 +164,7 @@ def _declared_first(data: bytes) -> bytes:
     return b'<?xml version="1.0" encoding="' + said + b'"?>' + above.removeprefix(b"\xef\xbb\xbf") + below
 
 
-class _Found(Exception):
+class _RootFound(Exception):
     """Ends the parsing by expat."""
 
 
@@ -175,13 +175,13 @@ def _declares_document_type(data: bytes) -> bool | None:
 
     def end(declared: bool) -> None:
         found.append(declared)
-        raise _Found
+        raise _RootFound
 
     parser.StartDoctypeDeclHandler = lambda *_: end(True)
     parser.StartElementHandler = lambda *_: end(False)
     try:
         parser.Parse(data, True)
-    except _Found:
+    except _RootFound:
         return found[0]
     except (expat.ExpatError, ValueError, LookupError):  # broken, or an encoding unknown to expat: lxml reports it
         return None

@@ -26,7 +26,11 @@ def walk_xml(blocks: Iterable[bytes], walker: XmlWalker, name: str, *, refusal: 
     Raises ``refusal`` with a message starting with ``name``: broken XML, or a document type. Nothing else is opened.
     """
     parser = etree.XMLParser(
-        target=_Told(walker, name, refusal), resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False
+        target=_WalkerTarget(walker, name, refusal),
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
     )
     try:
         for block in blocks:
@@ -36,7 +40,7 @@ def walk_xml(blocks: Iterable[bytes], walker: XmlWalker, name: str, *, refusal: 
         raise refusal(f"{name}: its XML is broken ({' '.join(str(error).split())[:120]}); export it again") from error
 
 
-class _Told:
+class _WalkerTarget:
     """Adapter from lxml's parser target to a walker."""
 
     def __init__(self, walker: XmlWalker, name: str, refusal: Refusal):

@@ -29,7 +29,7 @@ _AXES = {
 
 
 @dataclass(frozen=True)
-class UpTold:
+class UpDirection:
     """The up direction ``axis (3,)``, a description of how it was found, and the RMS roll of the cameras about it."""
 
     axis: np.ndarray
@@ -37,7 +37,7 @@ class UpTold:
     roll_deg: float
 
 
-def up_of_cameras(rotations: np.ndarray, usual: str | None = None) -> UpTold | None:
+def up_from_level_cameras(rotations: np.ndarray, usual: str | None = None) -> UpDirection | None:
     """Return the up direction from camera ``rotations (N, 3, 3)`` (world to camera, x right, y down); None if ambiguous.
 
     Tried in order: a world axis about which the cameras are level, first ``usual`` ('z', '-y', ...); any direction about which
@@ -49,27 +49,29 @@ def up_of_cameras(rotations: np.ndarray, usual: str | None = None) -> UpTold | N
     for name in sorted(_AXES, key=lambda name: name != usual):
         told = _about(np.array(_AXES[name]), aside, upward)
         if told is not None and told <= _AXIS_ROLL_DEG:
-            return UpTold(np.array(_AXES[name]), f"the world's {name} axis, which the cameras are level about", told)
+            return UpDirection(
+                np.array(_AXES[name]), f"the world's {name} axis, which the cameras are level about", told
+            )
     _, spread, directions = np.linalg.svd(aside / np.sqrt(len(aside)))
     if len(aside) > 1 and spread[1] >= _LEAST_SPREAD:
         level = directions[2] * (1.0 if float(upward.mean(axis=0) @ directions[2]) >= 0 else -1.0)
         told = _about(level, aside, upward)
         if told is not None and told <= MOST_ROLL_DEG:
-            return UpTold(level, "the direction that the cameras are level about", told)
-    on_edge = _level_on_an_edge(rotations)
+            return UpDirection(level, "the direction that the cameras are level about", told)
+    on_edge = _up_from_image_edges(rotations)
     if on_edge is not None:
         return on_edge
     if usual is not None and float(upward.mean(axis=0) @ np.array(_AXES[usual])) >= _LEAST_UPRIGHT:
         roll = _roll_deg(np.array(_AXES[usual]), aside)
-        return UpTold(np.array(_AXES[usual]), f"the world's {usual} axis, as is usual of such files", roll)
+        return UpDirection(np.array(_AXES[usual]), f"the world's {usual} axis, as is usual of such files", roll)
     return None
 
 
-def _level_on_an_edge(rotations: np.ndarray) -> UpTold | None:
+def _up_from_image_edges(rotations: np.ndarray) -> UpDirection | None:
     """Return the direction that is level with one of the two sides of each camera's image."""
     down = rotations[:, 2].mean(axis=0)
     starts = [np.array(axis) for axis in _AXES.values()] + [-down / max(float(np.linalg.norm(down)), 1e-9)]
-    found: list[UpTold] = []
+    found: list[UpDirection] = []
     for axis in starts:
         for _ in range(_ROUNDS):
             upright = np.abs(rotations[:, 0] @ axis) <= np.abs(rotations[:, 1] @ axis)
@@ -79,13 +81,13 @@ def _level_on_an_edge(rotations: np.ndarray) -> UpTold | None:
         axis = axis * (1.0 if float(down @ axis) <= 0 else -1.0)
         if len(sides) >= _LEAST_ON_EDGE and spread[1] >= _LEAST_SPREAD and -float(down @ axis) >= _LEAST_DOWN:
             found.append(
-                UpTold(axis, "the direction that a side of each picture is level about", _roll_deg(axis, sides))
+                UpDirection(axis, "the direction that a side of each picture is level about", _roll_deg(axis, sides))
             )
     best = min(found, key=lambda told: told.roll_deg, default=None)
     return best if best is not None and best.roll_deg <= _EDGE_ROLL_DEG else None
 
 
-def up_as_stated(rotations: np.ndarray, name: str) -> UpTold | None:
+def up_from_world_axis(rotations: np.ndarray, name: str) -> UpDirection | None:
     """Return a stated world axis ('y', 'z') as the up direction; None if most photos would be upside down.
 
     If the cameras indicate another direction, the description says so.
@@ -93,10 +95,10 @@ def up_as_stated(rotations: np.ndarray, name: str) -> UpTold | None:
     axis = np.array(_AXES[name])
     if float((-rotations[:, 1]).mean(axis=0) @ axis) < -_LEAST_UPRIGHT:
         return None
-    seen, said = up_of_cameras(rotations), f"the world's {name} axis, as was stated"
+    seen, said = up_from_level_cameras(rotations), f"the world's {name} axis, as was stated"
     if seen is not None and float(seen.axis @ axis) < _SAME_UP:
         said += f", though the cameras tell {seen.said}"
-    return UpTold(axis, said, _roll_deg(axis, rotations[:, 0]))
+    return UpDirection(axis, said, _roll_deg(axis, rotations[:, 0]))
 
 
 def _about(axis: np.ndarray, aside: np.ndarray, upward: np.ndarray) -> float | None:

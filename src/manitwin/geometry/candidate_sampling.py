@@ -138,14 +138,14 @@ def _middles(
             pass  # the side of a round object has no centre
         elif half > _SMALL_SHARE * size_m:
             middles += [index] if len(middles) < _MIDDLES else []
-        elif len(bumps) < _BUMPS and _stands_out(points_m[around], points_m[top], normals[top], half):
+        elif len(bumps) < _BUMPS and _is_raised(points_m[around], points_m[top], normals[top], half):
             bumps.append(index)
         left[alike] = False
         left[top] = False
     return middles, bumps
 
 
-def _stands_out(around_m: np.ndarray, top_m: np.ndarray, normal: np.ndarray, half_m: float) -> bool:
+def _is_raised(around_m: np.ndarray, top_m: np.ndarray, normal: np.ndarray, half_m: float) -> bool:
     offset = around_m - top_m
     height = offset @ normal
     across = np.linalg.norm(offset - height[:, None] * normal, axis=1)

@@ -97,56 +97,58 @@ def choose_up(
     poses = stable_poses(solid.vertices, _center_of_mass(solid))
     if user != "auto":
         upright_vessel = by_convention and bool(opens_up) and not level
-        stood = _stood_up(solid, poses, _axis(user), vessel=True) if upright_vessel else None
+        stood = _find_standing_pose(solid, poses, _axis(user), vessel=True) if upright_vessel else None
         if stood is not None and not _opens_along(solid, _axis(user)):
-            return _turned(stood, user, _LAY.format(user))
+            return _rotate_onto_facet(stood, user, _LAY.format(user))
         if by_convention and stands is False and _likeliest_within(poses, _axis(user), _TILTED_DEG) is None:
-            return _turned(_likeliest_side(poses, _axis(user)), user, _ON_END.format(user))
-        return _as_told(poses, user, said_by)
+            return _rotate_onto_facet(_likeliest_side(poses, _axis(user)), user, _ON_END.format(user))
+        return _choose_stated_up(poses, user, said_by)
     axis = file_up or "z"
     if stands is False:
         pose = _likeliest_side(poses, _axis(axis))
-        return _turned(pose, axis, "such a thing lies; this is the side it most likely lies on")
+        return _rotate_onto_facet(pose, axis, "such a thing lies; this is the side it most likely lies on")
     opening = None if opens_aside else find_opening(solid)
     on_end = bool(stands) and not level
     axes = [axis] if file_up else _undeclared_axes(solid, on_end)
     unnamed = opens_up is None and stands is None
     if opening is not None and (opens_up is False or (unnamed and file_up is not None)):
-        kept = _open_below(poses, axes, opening.axis)
+        kept = _find_inverted_pose(poses, axes, opening.axis)
         if kept is not None:
-            return _turned(kept[1], kept[0], f"it rests with {kept[0]} up, and such a thing may be hollow from below")
+            return _rotate_onto_facet(
+                kept[1], kept[0], f"it rests with {kept[0]} up, and such a thing may be hollow from below"
+            )
     if opening is not None:
         pose_up = _nearest(poses, opening.axis, _TILTED_DEG)
         if pose_up is not None:
-            return _turned(pose_up, axis, "its opening points up")
+            return _rotate_onto_facet(pose_up, axis, "its opening points up")
     if on_end:
-        pose_up = _stood_up(solid, poses, _axis(axes[0]), vessel=bool(opens_up))
+        pose_up = _find_standing_pose(solid, poses, _axis(axes[0]), vessel=bool(opens_up))
         if pose_up is not None:
-            return _turned(pose_up, axes[0], _LAY.format(axes[0]))
+            return _rotate_onto_facet(pose_up, axes[0], _LAY.format(axes[0]))
     if on_end and file_up is None:
-        pose_up = _stood_over(solid, poses, _axis(axes[0]))
+        pose_up = _find_upside_down_pose(solid, poses, _axis(axes[0]))
         if pose_up is not None:
-            return _turned(pose_up, axes[0], _OVER.format(axes[0]))
+            return _rotate_onto_facet(pose_up, axes[0], _OVER.format(axes[0]))
     for candidate in axes:
         near = _nearest(poses, _axis(candidate), _NEAR_DEG)
         if near is not None:
-            return _turned(
+            return _rotate_onto_facet(
                 near, candidate, f"it rests with the {'format' if file_up else 'file'}'s {candidate} axis up"
             )
     tilted = _likeliest_within(poses, _axis(axis), _TILTED_DEG)
     if on_end:
-        turned = _on_another_axis(poses, axes)
+        turned = _find_pose_on_other_axis(poses, axes)
         if turned is not None and (tilted is None or turned.probability >= tilted.probability):
-            return _turned(
+            return _rotate_onto_facet(
                 turned, axis, f"its file has another axis up: it rests so, and not with {' or '.join(axes)} up"
             )
     if tilted is not None:
-        return _turned(tilted, axis, f"tilted to the nearest side that it rests on, from {axis} up")
+        return _rotate_onto_facet(tilted, axis, f"tilted to the nearest side that it rests on, from {axis} up")
     if stands:
         over = _nearest(poses, -_axis(axis), _NEAR_DEG)
         if over is not None:
-            return _turned(over, axis, _OVER.format(axis))
-    return _turned(
+            return _rotate_onto_facet(over, axis, _OVER.format(axis))
+    return _rotate_onto_facet(
         _likeliest_side(poses, _axis(axis)), axis, f"it does not rest with {axis} up; this is its likeliest side"
     )
 
@@ -157,16 +159,16 @@ def _center_of_mass(solid: trimesh.Trimesh) -> np.ndarray:
     return np.asarray(solid.convex_hull.center_mass)
 
 
-def _as_told(poses: list[StablePose], axis: str, said_by: str) -> UpChoice:
+def _choose_stated_up(poses: list[StablePose], axis: str, said_by: str) -> UpChoice:
     near = _nearest(poses, _axis(axis), _NEAR_DEG, least=0.0)
     if near is not None:
-        return _turned(near, axis, f"{axis} is up as {said_by} says")
+        return _rotate_onto_facet(near, axis, f"{axis} is up as {said_by} says")
     return UpChoice(
         _FORMAT_TO_Z_UP[axis], axis, 0.0, 0.0, f"{axis} is up as {said_by} says, although it does not rest so"
     )
 
 
-def _open_below(poses: list[StablePose], axes: list[str], opening: np.ndarray) -> tuple[str, StablePose] | None:
+def _find_inverted_pose(poses: list[StablePose], axes: list[str], opening: np.ndarray) -> tuple[str, StablePose] | None:
     """Return the first of the file's axes on which the object rests with its opening underneath, and that pose."""
     for axis in axes:
         near = _nearest(poses, _axis(axis), _NEAR_DEG)
@@ -180,7 +182,9 @@ def _opens_along(solid: trimesh.Trimesh, up: np.ndarray) -> bool:
     return opening is not None and float(opening.axis @ up) > np.cos(np.radians(_TILTED_DEG))
 
 
-def _stood_up(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray, *, vessel: bool) -> StablePose | None:
+def _find_standing_pose(
+    solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray, *, vessel: bool
+) -> StablePose | None:
     """Return the end on which a lying round, long object or short round vessel stands; None if it already stands along ``up``.
 
     The more likely end is chosen. For a short vessel with two nearly equally likely ends, it is the one with the file's axis
@@ -199,7 +203,7 @@ def _stood_up(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray, *
     return max(ends, key=lambda pose: pose.probability, default=None)
 
 
-def _stood_over(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray) -> StablePose | None:
+def _find_upside_down_pose(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray) -> StablePose | None:
     """Return the pose upside down of a round, long object that rests on that end only, e.g. a pump bottle inverted in its
     file.
     """
@@ -256,7 +260,7 @@ def _undeclared_axes(solid: trimesh.Trimesh, on_end: bool) -> list[str]:
     return ["z", "y"]
 
 
-def _on_another_axis(poses: list[StablePose], axes: list[str]) -> StablePose | None:
+def _find_pose_on_other_axis(poses: list[StablePose], axes: list[str]) -> StablePose | None:
     """Return the likeliest pose with exactly another of the file's axes upward, or one of ``axes`` downward."""
     others = [sign * _axis(axis) for axis in _FORMAT_TO_Z_UP for sign in (1, -1) if sign < 0 or axis not in axes]
     found = [_nearest(poses, up, _EXACTLY_DEG) for up in others]
@@ -293,7 +297,7 @@ def _likeliest_side(poses: list[StablePose], up: np.ndarray) -> StablePose:
     return min(nearly, key=lambda side: round(_angle_deg(side[0], up), 3))[0]
 
 
-def _turned(pose: StablePose, axis: str, reason: str) -> UpChoice:
+def _rotate_onto_facet(pose: StablePose, axis: str, reason: str) -> UpChoice:
     """Return the smallest rotation that brings the file's axis onto the pose's support facet.
 
     If the object is laid down, the axis that was up is then rotated about the vertical onto the nearest of X and Y: a round

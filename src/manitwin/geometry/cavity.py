@@ -10,7 +10,7 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from manitwin.geometry.hulls.reduction import hull_volume
-from manitwin.geometry.kept import kept
+from manitwin.geometry.mesh_cache import cached_on_mesh
 from manitwin.geometry.poses import rotation_between
 
 # Measured on 25 real meshes: the shallowest vessel (a plate) has a depth of 4.4 % of the longest side, and the smallest (a
@@ -47,7 +47,7 @@ def cavity_volume(
     ``hull`` is the mesh's convex hull if already known. The grid has ``cells`` along the longer side.
     """
     hull = mesh.convex_hull if hull is None else hull
-    grid = _look_grid(hull, np.asarray(up, dtype=float), cells)
+    grid = _make_ray_grid(hull, np.asarray(up, dtype=float), cells)
     return grid.volume_between(grid.heights(RayMeshIntersector(mesh)), grid.heights(RayMeshIntersector(hull)))
 
 
@@ -61,7 +61,7 @@ def find_opening(mesh: trimesh.Trimesh, cells: int = 64) -> Opening | None:
 
     Source: filling of depressions as in priority flood (Barnes, Lehman and Mulla 2014).
     """
-    return kept(mesh, f"opening {cells}", lambda: _found_opening(mesh, cells))
+    return cached_on_mesh(mesh, f"opening {cells}", lambda: _found_opening(mesh, cells))
 
 
 def _found_opening(mesh: trimesh.Trimesh, cells: int) -> Opening | None:
@@ -74,13 +74,13 @@ def _found_opening(mesh: trimesh.Trimesh, cells: int) -> Opening | None:
         least_m3 = hull.volume * (_MIN_VOLUME_SHARE if axis[2] > 0.99 else _MIN_VOLUME_SHARE_SIDEWAYS)
         if best is not None:
             least_m3 = max(least_m3, best.volume_m3 * 1.02)
-        grid = _look_grid(hull, axis, cells)
+        grid = _make_ray_grid(hull, axis, cells)
         heights = grid.heights(mesh_rays)
         if grid.volume_between(heights, grid.heights(hull_rays)) < least_m3:
             continue
         # A wall thinner than a cell may fall between two rays. Raising cells to its edges closes it, but it then fills whole
         # cells.
-        basins = [_basin(grid, grid.with_drains_closed(each)) for each in (heights, grid.with_edges(heights, mesh))]
+        basins = [_basin(grid, grid.close_drains(each)) for each in (heights, grid.raise_to_edges(heights, mesh))]
         opening = max((b for b in basins if b is not None), key=lambda basin: basin.volume_m3, default=None)
         if (
             opening is not None
@@ -92,7 +92,7 @@ def _found_opening(mesh: trimesh.Trimesh, cells: int) -> Opening | None:
 
 
 @dataclass(frozen=True)
-class _LookGrid:
+class _RayGrid:
     """Parallel rays along ``-up`` from a square grid: ``origins (R, 3)`` above the mesh, in rows of ``shape``."""
 
     origins: np.ndarray
@@ -109,7 +109,7 @@ class _LookGrid:
             heights[rays] = locations @ self.up
         return heights.reshape(self.shape)
 
-    def with_edges(self, heights: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
+    def raise_to_edges(self, heights: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
         """Return heights raised to the mesh's edges in each cell, so that a rim counts however thin its wall is."""
         rotation = rotation_between(self.up, np.array([0.0, 0, 1]))
         ends = (mesh.vertices @ rotation.T)[mesh.edges_unique]
@@ -125,7 +125,7 @@ class _LookGrid:
         np.maximum.at(raised, (cell[:, 0], cell[:, 1]), points[:, 2])
         return np.where(np.isinf(raised), np.nan, raised)
 
-    def with_drains_closed(self, heights: np.ndarray) -> np.ndarray:
+    def close_drains(self, heights: np.ndarray) -> np.ndarray:
         """Return heights with small inner holes filled to the level of their border, e.g. the drain of a flower pot."""
         count, labels, stats, _ = cv2.connectedComponentsWithStats(np.isnan(heights).astype(np.uint8), connectivity=4)
         closed = heights.copy()
@@ -143,7 +143,7 @@ class _LookGrid:
         return float(np.nansum(np.maximum(upper - lower, 0))) * self.cell_m**2
 
 
-def _look_grid(hull: trimesh.Trimesh, up: np.ndarray, cells: int) -> _LookGrid:
+def _make_ray_grid(hull: trimesh.Trimesh, up: np.ndarray, cells: int) -> _RayGrid:
     up = up / np.linalg.norm(up)
     rotation = rotation_between(up, np.array([0.0, 0, 1]))
     local = hull.vertices @ rotation.T
@@ -152,7 +152,7 @@ def _look_grid(hull: trimesh.Trimesh, up: np.ndarray, cells: int) -> _LookGrid:
     x, y = (np.arange(low[a] + cell / 2, high[a], cell) for a in range(2))
     grid_x, grid_y = np.meshgrid(x, y, indexing="ij")
     above = np.full(grid_x.size, high[2] + (high - low).max())
-    return _LookGrid(np.stack([grid_x.ravel(), grid_y.ravel(), above], axis=1) @ rotation, grid_x.shape, up, cell)
+    return _RayGrid(np.stack([grid_x.ravel(), grid_y.ravel(), above], axis=1) @ rotation, grid_x.shape, up, cell)
 
 
 def _candidate_axes(hull: trimesh.Trimesh) -> list[np.ndarray]:
@@ -165,7 +165,7 @@ def _candidate_axes(hull: trimesh.Trimesh) -> list[np.ndarray]:
     return axes
 
 
-def _basin(grid: _LookGrid, heights: np.ndarray) -> Opening | None:
+def _basin(grid: _RayGrid, heights: np.ndarray) -> Opening | None:
     """Return the deepest basin of a height field; None if all water runs off."""
     if not np.isfinite(heights).any():
         return None

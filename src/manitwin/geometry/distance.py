@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from manitwin.geometry.kept import kept
+from manitwin.geometry.mesh_cache import cached_on_mesh
 
 _LEAF_TRIANGLES = 4
 _PAIRS_PER_CHUNK = 400_000  # (point, node) pairs tested at once, to bound the memory
@@ -24,7 +24,7 @@ def closest_faces(points: np.ndarray, mesh: trimesh.Trimesh) -> tuple[np.ndarray
     Method: branch and bound over a balanced tree of boxes, with the nearest vertex as the initial bound; point to triangle
     distance after Ericson, Real-Time Collision Detection, 5.1.5.
     """
-    return ClosestFaces(mesh).of(points)
+    return ClosestFaces(mesh).find_closest(points)
 
 
 def signed_distance(points: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
@@ -104,9 +104,9 @@ class ClosestFaces:
     """A mesh prepared for repeated ``closest_faces`` queries."""
 
     def __init__(self, mesh: trimesh.Trimesh):
-        self._tree = kept(mesh, "box tree", lambda: _BoxTree(np.asarray(mesh.triangles, dtype=float)))
+        self._tree = cached_on_mesh(mesh, "box tree", lambda: _BoxTree(np.asarray(mesh.triangles, dtype=float)))
 
-    def of(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def find_closest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the index ``(N,)`` of the face closest to each point ``(N, 3)``, and the exact distance ``(N,)`` m."""
         return self._tree.closest(np.asarray(points, dtype=float).reshape(-1, 3))
 

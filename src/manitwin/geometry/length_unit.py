@@ -74,15 +74,15 @@ def decide_unit(
     if expected_m is not None and _usual(size_m, expected_m):
         return LengthUnit(factor, True, "declared" if declared else "assumed", None)
     if _is_normalised(size_m):
-        return _not_believed(factor, f"its longest side of {size_m:.3g} looks scaled to a unit cube")
+        return _implausible_unit(factor, f"its longest side of {size_m:.3g} looks scaled to a unit cube")
     if PLAUSIBLE_M[0] <= size_m <= PLAUSIBLE_M[1]:
         if expected_m is not None and not declared:
-            return _not_believed(factor, f"its longest side of {size_m:.3g} m is not that of such a thing")
+            return _implausible_unit(factor, f"its longest side of {size_m:.3g} m is not that of such a thing")
         return LengthUnit(factor, True, "declared" if declared else "assumed", None)
-    return _guessed(longest_axis, factor, declared, expected_m, file_format)
+    return _infer_unit(longest_axis, factor, declared, expected_m, file_format)
 
 
-def _guessed(
+def _infer_unit(
     longest_axis: float,
     factor: float,
     declared: bool,
@@ -123,7 +123,7 @@ def _sure_unit(
     return best if enough else None
 
 
-def _not_believed(factor: float, cause: str) -> LengthUnit:
+def _implausible_unit(factor: float, cause: str) -> LengthUnit:
     return LengthUnit(factor, False, "unknown", f"{cause}; its scale was not believed; give --units")
 
 

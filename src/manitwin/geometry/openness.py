@@ -12,7 +12,7 @@ DIRECTIONS = 24
 _OFF_SURFACE = 1e-4  # fraction of the body's size: offset of the ray origins
 
 
-def open_share(mesh: trimesh.Trimesh, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def unoccluded_share(mesh: trimesh.Trimesh, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Return the unoccluded share ``(N,)`` of the surroundings before each surface point ``(N, 3)``.
 
     It is 1 on a convex body and 0 in a closed cavity: the accessibility of ambient light, weighted by the cosine to the outward

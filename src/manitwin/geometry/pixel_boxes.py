@@ -14,7 +14,7 @@ def box_of_pixels(mask: np.ndarray) -> PixelBox:
     return float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1)
 
 
-def share_in_common(one: PixelBox, other: PixelBox) -> float:
+def intersection_over_union(one: PixelBox, other: PixelBox) -> float:
     """Return the intersection over union of two boxes, 0..1."""
     width = min(one[2], other[2]) - max(one[0], other[0])
     height = min(one[3], other[3]) - max(one[1], other[1])
@@ -23,13 +23,13 @@ def share_in_common(one: PixelBox, other: PixelBox) -> float:
     return both / (sum(areas) - both)
 
 
-def to_picture(box: PixelBox, window: PixelBox, scale: tuple[float, float]) -> PixelBox:
+def crop_to_image_box(box: PixelBox, window: PixelBox, scale: tuple[float, float]) -> PixelBox:
     """Convert a box from a crop (``window``, enlarged by ``scale`` (x, y)) to pixels of the whole image."""
     left, top = window[:2]
     return left + box[0] / scale[0], top + box[1] / scale[1], left + box[2] / scale[0], top + box[3] / scale[1]
 
 
-def to_window(box: PixelBox, window: PixelBox, scale: float) -> PixelBox:
+def image_to_crop_box(box: PixelBox, window: PixelBox, scale: float) -> PixelBox:
     """Convert a box from pixels of the whole image to those of a crop (``window``, enlarged by ``scale``)."""
     left, top = window[:2]
     return scale * (box[0] - left), scale * (box[1] - top), scale * (box[2] - left), scale * (box[3] - top)

@@ -11,7 +11,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 from manitwin.geometry.hulls.reduction import hull_mesh
-from manitwin.geometry.kept import kept
+from manitwin.geometry.mesh_cache import cached_on_mesh
 
 MILLIMETRES = 1000.0  # Embree uses float32 with absolute tolerances, so hand-sized objects need larger units
 
@@ -42,7 +42,7 @@ class RayCaster:
 
     @cached_property
     def _prepared(self) -> tuple[EmbreeScene, TriangleMesh]:
-        return kept(self._mesh, "rays", lambda: _rays(self._mesh))
+        return cached_on_mesh(self._mesh, "rays", lambda: _rays(self._mesh))
 
     def first_hits(self, origins_m: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return distance (m; inf: no hit) and face index (-1: no hit) of each ray's first hit.

@@ -73,7 +73,7 @@ class StaticBox:
     box_to_world: np.ndarray
 
 
-def stands_for_a_plane(box: StaticBox) -> bool:
+def is_plane_equivalent(box: StaticBox) -> bool:
     """Return whether a box is a table top at z = 0, the robot's base height, that may be treated as an infinite plane.
 
     Physics and planners use a plane instead of such a box. In PhysX, contacts of hulls on a box persist from step to step, and

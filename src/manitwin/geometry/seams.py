@@ -24,13 +24,13 @@ def close_seams(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np
     borders = _border_edges(faces)
     if not len(borders):
         return np.arange(len(vertices)), faces
-    source, split = _one_vertex_a_wedge(faces, len(vertices))
+    source, split = _split_fans(faces, len(vertices))
     _, place = np.unique(vertices, axis=0, return_inverse=True)
     joined = _join(_border_edges(split), place.reshape(-1)[source])
     return source, np.concatenate([split, np.array(joined, np.int64).reshape(-1, 3)])
 
 
-def _one_vertex_a_wedge(faces: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+def _split_fans(faces: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """Split vertices so that every fan of faces has its own vertex; two fans then meet along at most one seam.
 
     Returns for each new vertex the old index ``(W,)``, and the faces in new indices. Unused vertices are dropped.
@@ -50,7 +50,7 @@ def _one_vertex_a_wedge(faces: np.ndarray, vertex_count: int) -> tuple[np.ndarra
     return faces.reshape(-1)[first], wedge[corner].astype(np.int64)
 
 
-def has_three_places(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def has_distinct_corners(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Return a mask ``(F,)`` of the faces with three distinct corner positions."""
     corners = vertices[faces]
     same = [(corners[:, i] == corners[:, (i + 1) % 3]).all(1) for i in range(3)]

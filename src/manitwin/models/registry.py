@@ -15,7 +15,7 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from manitwin.config import BuildConfig
-from manitwin.errors import ConfigError, Unavailable, choose_from
+from manitwin.errors import ConfigError, Unavailable, unknown_name_message
 
 GROUP = "manitwin.backends"
 URL_OF_SERVER = re.compile(r"^(?!command:)(.*)@[A-Za-z][A-Za-z0-9+.-]*://\S+$")
@@ -44,7 +44,7 @@ def target(kind: str, spec: str) -> str:
     """Return the ``module:attribute`` of the backend that a spec names; raises ConfigError, which lists the valid names."""
     name, names = _parts(spec)[0], backends().get(kind, {})
     if name not in names:
-        raise ConfigError(choose_from(kind, name, names))
+        raise ConfigError(unknown_name_message(kind, name, names))
     return names[name]
 
 

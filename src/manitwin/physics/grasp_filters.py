@@ -79,7 +79,7 @@ def pad_contacts(
 
 
 @dataclass(frozen=True)
-class _Touched:
+class _TouchingCells:
     """Touching cells of one pad: number ``cells (N,)``, centre ``center_m (N, 2)``, bounds ``least_m`` and ``most_m (N, 2)``.
 
     Coordinates are Y (across) and Z (along the approach) of the gripper frame.
@@ -90,8 +90,8 @@ class _Touched:
     least_m: np.ndarray
     most_m: np.ndarray
 
-    def take(self, index: np.ndarray) -> _Touched:
-        return _Touched(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+    def take(self, index: np.ndarray) -> _TouchingCells:
+        return _TouchingCells(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,8 @@ class _PadHits:
     """
 
     depth_m: np.ndarray
-    soft: _Touched
-    unturned: _Touched
+    soft: _TouchingCells
+    unturned: _TouchingCells
     alignment: np.ndarray
 
     def take(self, index: np.ndarray) -> _PadHits:
@@ -151,11 +151,11 @@ def _placed(points_m: np.ndarray, rotation: np.ndarray, origin_m: np.ndarray) ->
     return placed
 
 
-def _touched(touching: np.ndarray, grid: np.ndarray) -> _Touched:
+def _touched(touching: np.ndarray, grid: np.ndarray) -> _TouchingCells:
     """Summarise the touching cells, ``touching (N, C)`` bool, of a pad with cell centres ``grid (C, 2)``."""
     count, least_m, most_m = _ends_of_cells(tuple(map(tuple, grid.tolist())))
     which = touching @ (1 << np.arange(len(grid)))
-    return _Touched(
+    return _TouchingCells(
         count[which],
         touching @ grid / np.maximum(count[which], 1)[:, None],
         least_m[which],
@@ -202,7 +202,7 @@ def _both_pads(
     )
 
 
-def _pressed(plus: _Touched, minus: _Touched, width_m: np.ndarray, off_m: np.ndarray) -> PressedPads:
+def _pressed(plus: _TouchingCells, minus: _TouchingCells, width_m: np.ndarray, off_m: np.ndarray) -> PressedPads:
     return PressedPads(
         middle_m=np.column_stack([off_m, (plus.center_m + minus.center_m) / 2]),
         width_m=width_m,
@@ -273,7 +273,7 @@ def lowest_points_m(gripper: ParallelGripper, gripper_to_object: np.ndarray, obj
     return origins + (along @ corners.T).min(1)
 
 
-def raised(
+def retract_from_plane(
     gripper: ParallelGripper, gripper_to_object: np.ndarray, object_to_plane: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Draw grasps whose hand penetrates the support plane back along their approach until it is clear.

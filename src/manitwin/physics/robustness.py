@@ -37,7 +37,7 @@ class SequentialTest:
         loss = math.log((1 - self.robust_share) / (1 - self.fragile_share))
         return held * gain + (trials - held) * loss
 
-    def is_clear(self, held: int, trials: int) -> bool:
+    def is_decided(self, held: int, trials: int) -> bool:
         """Tell whether the test is decided or ``max_trials`` is reached."""
         bound = math.log((1 - self.error) / self.error)
         return trials >= self.max_trials or abs(self.log_ratio(held, trials)) >= bound - ROUNDING
@@ -65,18 +65,18 @@ class Robustness:
         return (self.held + 1) / (self.trials + 2)
 
 
-def try_until_clear(holds: Callable[[int], bool], test: SequentialTest) -> Robustness:
+def run_sequential_test(holds: Callable[[int], bool], test: SequentialTest) -> Robustness:
     """Call ``holds(0)``, ``holds(1)``, ... until the test is decided or ``max_trials`` is reached."""
     held = 0
     for number in range(test.max_trials):
         held += holds(number)
-        if test.is_clear(held, number + 1):
+        if test.is_decided(held, number + 1):
             break
     return Robustness(held, number + 1)
 
 
 @dataclass(frozen=True)
-class Spread:
+class PerturbationRanges:
     """Ranges from which perturbations are drawn.
 
     ``pose_m`` and ``pose_deg`` are the largest translation and rotation of the hand about its fingertips; ``friction``
@@ -169,7 +169,7 @@ class Perturbation:
         )
 
 
-def draw_perturbations(spread: Spread, count: int, seed: int) -> list[Perturbation]:
+def draw_perturbations(spread: PerturbationRanges, count: int, seed: int) -> list[Perturbation]:
     """Draw ``count`` perturbations from a scrambled Sobol sequence; the same for every grasp of an object.
 
     Translations and rotations are uniform in their balls, factors are uniform, masses are log-uniform.

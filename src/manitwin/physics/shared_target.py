@@ -28,7 +28,7 @@ class SharedTarget:
         self._press_m = settings.force_n / settings.finger_stiffness_n_m
         self._ramp_m = settings.close_speed_m_s * settings.frame_s
 
-    def move_on(self, mean_position_m: float) -> float:
+    def advance_target(self, mean_position_m: float) -> float:
         """Advance the target by one frame and return it (m); ``mean_position_m`` is the mean position of the two fingers."""
         self._met = self._met or mean_position_m <= self._met_m
         if self._met:

@@ -16,7 +16,7 @@ from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import HandContacts, run_phases
 from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
-from manitwin.robots.grippers.gripper import Gripper, of_kind
+from manitwin.robots.grippers.gripper import Gripper, require_kind
 from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.suction import SuctionGripper
 
@@ -65,7 +65,7 @@ class SuctionTrial:
     ) -> list[tuple[_Scene, np.ndarray]]:
         """Return the scene of each grasp with the object's initial pose ``(4, 4)`` in the hand's frame."""
         surface = RayCaster.of_hulls(body.hulls) if body.surface is None else body.surface
-        cup = of_kind(gripper, SuctionGripper)
+        cup = require_kind(gripper, SuctionGripper)
         found = seal(cup, gripper_to_object, surface)
         pressed_on = gripper_to_object.copy()
         pressed_on[:, :3, 3] += found.advance_m[:, None] * pressed_on[:, :3, 2]

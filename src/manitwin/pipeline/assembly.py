@@ -20,7 +20,7 @@ from manitwin.formats.installation import installed_version
 from manitwin.formats.npy_file import labels_to_npy
 from manitwin.formats.packed_source import mask_name, mask_names, masks_beside, pack_photos, pack_source, photo_names
 from manitwin.geometry.hulls.reduction import hull_to_obj
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.pipeline.drawn_masks import drawn_mask, with_drawn_masks
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.guesses import (
@@ -29,8 +29,8 @@ from manitwin.pipeline.guesses import (
     naming_checks,
     size_checks,
     template_checks,
+    typical_size_words,
     unknown_name_words,
-    unsaid_size_words,
 )
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.links import link_table, read_articulation, visual_labels
@@ -39,12 +39,12 @@ from manitwin.pipeline.parts import PARTS_FILE
 from manitwin.pipeline.quality import rehearsal_checks
 from manitwin.pipeline.stated_poses import StatedPoses, poses_of
 from manitwin.pipeline.suspicious_size import suspicious_size_words
+from manitwin.twin.integrity import write_sizes
 from manitwin.twin.link_records import FACE_LINKS
 from manitwin.twin.part_records import FACE_PARTS
 from manitwin.twin.record import REJECTION_REASONS, Rejection, TwinRecord
-from manitwin.twin.shape_file import SHAPE, shape_of, shape_to_json
-from manitwin.twin.store import RUN, canonical_json, seal, write_bytes_atomically
-from manitwin.twin.wholeness import note_sizes
+from manitwin.twin.shape_file import SHAPE, compute_shape, shape_to_json
+from manitwin.twin.store import RUN, canonical_json, write_bytes_atomically, write_twin_record
 
 NAME_HINT = "say what it is with --name (mug, fork, ...) or a column name"
 
@@ -106,8 +106,8 @@ def assemble(
         ]
     run = {"stages": {name: vars(cost) for name, cost in costs.items()}, "host": host}
     write_bytes_atomically(fresh / RUN, canonical_json(run).encode())
-    sealed = seal(fresh, record)
-    note_sizes(fresh)
+    sealed = write_twin_record(fresh, record)
+    write_sizes(fresh)
     return sealed
 
 
@@ -191,7 +191,7 @@ def _rejection(rejected: Rejected, stage: str | None, draft: Draft[Item]) -> Rej
     if rejected.reason not in REJECTION_REASONS.get(named, frozenset()):
         named = next((s for s, reasons in REJECTION_REASONS.items() if rejected.reason in reasons), named)
     detail = rejected.detail
-    unsaid = unsaid_size_words(draft)
+    unsaid = typical_size_words(draft)
     if rejected.reason in OF_SIZE and unsaid is not None:
         detail += f", but {unsaid}"
     suspicious = suspicious_size_words(draft) if rejected.reason in OF_SIZE else None
@@ -203,7 +203,7 @@ def _rejection(rejected: Rejected, stage: str | None, draft: Draft[Item]) -> Rej
 def _write_accepted(draft: Draft[Item], folder: Path) -> None:
     for name in ("visual.glb", "grasps.parquet", "card.png"):
         shutil.copyfile(draft.path(name), folder / name)
-    (folder / SHAPE).write_bytes(shape_to_json(shape_of(folder / "visual.glb")))
+    (folder / SHAPE).write_bytes(shape_to_json(compute_shape(folder / "visual.glb")))
     if draft.field("parts"):
         with np.load(draft.path(PARTS_FILE)) as arrays:
             (folder / FACE_PARTS).write_bytes(labels_to_npy(arrays["visual"]))
@@ -277,7 +277,7 @@ def name_would_help(record: TwinRecord) -> bool:
     For an accepted twin: the mass or friction comes from a generic prior. For a rejected one: a generic size or mass was
     decisive, or size and mass contradict each other, or a lifted photo has no stable pose, as its posture depends on the name.
     """
-    if record.naming is None and lookup(record.name) is not None:
+    if record.naming is None and find_prior(record.name) is not None:
         return False
     if record.physical is not None:
         physical = record.physical

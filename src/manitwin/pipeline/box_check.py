@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from manitwin.geometry.pixel_boxes import PixelBox, box_of_pixels, share_in_common
-from manitwin.models.matting.matte import DoubtedCutOut, Matte
+from manitwin.geometry.pixel_boxes import PixelBox, box_of_pixels, intersection_over_union
+from manitwin.models.matting.matte import DoubtfulMatte, Matte
 
 LEAST_IN_COMMON = 0.8
 """Least intersection over union of the cut-out's box and the stated one; boxes of detectors and annotators are more accurate."""
@@ -15,9 +15,9 @@ ELSEWHERE = 0.25
 
 def require_in_box(matte: Matte, box_px: PixelBox, file: str) -> None:
     """Raise DoubtedCutOut if a matte's bounding box disagrees with the stated box of the object, in pixels of the matte."""
-    common = share_in_common(box_of_pixels(matte.rgba[..., 3] > 127), box_px)
+    common = intersection_over_union(box_of_pixels(matte.rgba[..., 3] > 127), box_px)
     if common < LEAST_IN_COMMON:
-        raise DoubtedCutOut(
+        raise DoubtfulMatte(
             "low_confidence_matte",
             f"{file}: the cut-out and the stated box overlap by only {100 * common:.0f} %; correct the box, or give"
             f" a mask of the object",

@@ -19,10 +19,10 @@ from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
 from manitwin.pipeline.object_state import load_solid, load_visual, pictures
 from manitwin.pipeline.views import write_webp
+from manitwin.render.background_colors import marker_color
 from manitwin.render.cameras import Camera, project
-from manitwin.render.grounds import marker_color
 from manitwin.render.markers import draw_markers, font_px
-from manitwin.render.raycast import merged, seen_tolerance_m, silhouette, visible_points
+from manitwin.render.raycast import merge_parts, silhouette, visibility_tolerance_m, visible_points
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class CandidatesStage:
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Choose and mark the candidates. Raises Rejected if the solid deviates from the visible surface."""
         solid = load_solid(draft.path("solid.npz"))
-        caster = RayCaster(merged(load_visual(draft.path("visual.glb"))))
+        caster = RayCaster(merge_parts(load_visual(draft.path("visual.glb"))))
         scale = draft.field("physical")["scale_applied"]
         cameras = [Camera.from_json(value).scaled(scale) for value in draft.field("cameras")]
         positions, normals, visible = choose_candidates(
@@ -92,7 +92,7 @@ def choose_candidates(
     one at the centre of a vessel's floor (``sample_candidates``). Raises Rejected if fewer than ``count`` samples are visible.
     """
     points, normals, _ = sample_surface(solid, samples, rng)
-    tolerance_m = seen_tolerance_m(solid.extents)
+    tolerance_m = visibility_tolerance_m(solid.extents)
     seen = np.stack([visible_points(points, normals, camera, caster, tolerance_m) for camera in cameras])
     shown = np.flatnonzero(seen.any(0))
     if len(shown) < count:

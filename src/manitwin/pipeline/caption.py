@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
 from manitwin.geometry.boxes import extents_along_sides
-from manitwin.models.annotators.photo_light import PhotoLight, light_of_photos
+from manitwin.models.annotators.photo_light import PhotoLight, estimate_mean_light
 from manitwin.models.annotators.protocol import Annotator
 from manitwin.pipeline.human_corrections import corrected_language
 from manitwin.pipeline.item import Item
@@ -70,4 +70,4 @@ def light_of_texture(draft: Draft[Item]) -> PhotoLight | None:
     """
     if not is_photographed(draft) or (draft.fields.get("matte") or {}).get("method", "alpha") == "alpha":
         return None
-    return light_of_photos(cut_out_photos(draft))
+    return estimate_mean_light(cut_out_photos(draft))

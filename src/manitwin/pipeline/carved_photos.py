@@ -12,14 +12,14 @@ import trimesh
 from manitwin.config import MattingConfig
 from manitwin.errors import InputError, Rejected, UsageError
 from manitwin.models.generators.lift.carved_part import carved_part
-from manitwin.models.generators.lift.carved_solid import Carved
-from manitwin.models.generators.lift.carving import are_crossing, carve, power_of
+from manitwin.models.generators.lift.carved_solid import CarvedSolid
+from manitwin.models.generators.lift.carving import are_crossing, carve, superellipse_power
 from manitwin.models.generators.lift.hint import hint_from_name
 from manitwin.models.generators.lift.posed_carving import carve_posed
 from manitwin.models.generators.lift.posed_views import scaled_part
-from manitwin.pipeline.photo import PhotoStage, refused
-from manitwin.pipeline.photo_groups import copies_told, given_twice, told_apart
-from manitwin.pipeline.photo_thinning import MOST_GIVEN, kept_photos, thinned_words
+from manitwin.pipeline.photo import PhotoStage, reject_doubted
+from manitwin.pipeline.photo_groups import distinct_names, first_duplicate, identical_file_messages
+from manitwin.pipeline.photo_thinning import MOST_GIVEN, select_photos, thinned_words
 from manitwin.pipeline.stated_poses import StatedPoses, stated_poses
 
 EXAMPLE = "such as --turns 0,90,180"
@@ -32,7 +32,7 @@ class CarvedPhotos:
     ``metric``: the part is in metres, from the unit of the stated poses; otherwise its longest side is 1.
     """
 
-    carved: Carved
+    carved: CarvedSolid
     part: trimesh.Trimesh
     findings: list[str]
     metric: bool = False
@@ -84,7 +84,7 @@ def carve_photos(
         )
     lenses = set(cut.focals_mm)
     focal_mm = lenses.pop() if len(lenses) == 1 else None
-    carved = carve(photos, turns, power=power_of(hint_from_name(name)), focal_mm=focal_mm)
+    carved = carve(photos, turns, power=superellipse_power(hint_from_name(name)), focal_mm=focal_mm)
     return CarvedPhotos(carved, carved_part(carved), [*cut.findings, *_left_out(carved)])
 
 
@@ -98,7 +98,7 @@ def _check(paths: Sequence[Path], turns_deg: Sequence[float] | None, poses: Path
         raise UsageError(
             f"photos: {len(paths)}, turns: {turns}; give 2 to {MOST_GIVEN} photos and one turn for each, {EXAMPLE}"
         )
-    twice = given_twice([str(path.resolve()) for path in paths])
+    twice = first_duplicate([str(path.resolve()) for path in paths])
     if twice is not None:
         raise UsageError(f"{Path(twice).name} is given twice; give each photo once")
     if turns_deg is not None and not np.isfinite(turns_deg).all():
@@ -114,7 +114,7 @@ def _thinned(
 ) -> tuple[Sequence[Path], Sequence[float] | None]:
     """Return the photos that are used, and their turns."""
     try:
-        kept = kept_photos(paths, turns_deg or (), poses)
+        kept = select_photos(paths, turns_deg or (), poses)
     except InputError as error:
         raise UsageError(f"--poses: {error.detail}") from error
     return [paths[number] for number in kept], None if turns_deg is None else [turns_deg[number] for number in kept]
@@ -129,12 +129,12 @@ def _stated(paths: Sequence[Path], poses: Path, up: str, units: str) -> StatedPo
 
 def _cut_out(paths: Sequence[Path], name: str | None, masks: Sequence[Path | None]) -> _CutOut:
     """Cut photos out as a build does. Raises Rejected if fewer than two are left."""
-    stage, names = PhotoStage(MattingConfig()), told_apart([str(path.resolve()) for path in paths])
-    found = _CutOut({}, [], copies_told([str(path.resolve()) for path in paths]))
+    stage, names = PhotoStage(MattingConfig()), distinct_names([str(path.resolve()) for path in paths])
+    found = _CutOut({}, [], identical_file_messages([str(path.resolve()) for path in paths]))
     reasons = []
     for number, (path, called, mask) in enumerate(zip(paths, names, masks, strict=True)):
         try:
-            rgba, field = stage.cut_out(path, name, refused, called, mask)
+            rgba, field = stage.cut_out(path, name, reject_doubted, called, mask)
         except InputError:
             raise
         except Rejected as doubt:
@@ -174,5 +174,5 @@ def _posed(
     return CarvedPhotos(carved, part, [*findings, told, *_left_out(carved)], metric=stated.unit_m is not None)
 
 
-def _left_out(carved: Carved) -> list[str]:
+def _left_out(carved: CarvedSolid) -> list[str]:
     return [f"{left}: left out, its outline does not go with those of the other photos" for left in carved.left_out]

@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from manitwin.errors import Rejected, UsageError
-from manitwin.models.matting.matte import DoubtedCutOut, Matte
+from manitwin.models.matting.matte import DoubtfulMatte, Matte
 
 CUTOUT = "cutout.webp"
 """File in the folder of a rejected photo: the doubtful cut-out, with transparent background."""
@@ -26,7 +26,7 @@ SHOWN_PX = 1024
 QUALITY = 85
 
 
-def shown_cutout(rgba: np.ndarray) -> bytes:
+def encode_preview(rgba: np.ndarray) -> bytes:
     """Return ``rgba (H, W, 4) uint8`` as a WebP file, at most ``SHOWN_PX`` large, for review."""
     encoded = io.BytesIO()
     picture = Image.fromarray(reduced(rgba, SHOWN_PX))
@@ -72,14 +72,14 @@ def _as_confirmed(rgba: np.ndarray, said: Mapping[str, Any]) -> np.ndarray | Non
     return np.dstack([rgba[..., :3], np.asarray(alpha)])
 
 
-def confirmed_or_rejected(doubted: DoubtedCutOut, name: str, amendment: Mapping[str, Any]) -> Matte:
+def confirmed_or_rejected(doubted: DoubtfulMatte, name: str, amendment: Mapping[str, Any]) -> Matte:
     """Return a doubtful cut-out that a person has confirmed. Raises Rejected, with its image, for any other.
 
     ``amendment`` is that of the photo stage. If the photo would now be cut out differently (by another version or other
     settings), the confirmed alpha channel is used. If that is missing or belongs to another part of the photo, the rejection
     asks for a new review.
     """
-    picture, said = shown_cutout(doubted.matte.rgba), amendment.get(CONFIRMED)
+    picture, said = encode_preview(doubted.matte.rgba), amendment.get(CONFIRMED)
     if said is None:
         raise Rejected(doubted.reason, doubted.detail, doubted.stage, {CUTOUT: picture})
     if hashlib.sha256(picture).hexdigest() != said["sha256"]:

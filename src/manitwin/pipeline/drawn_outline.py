@@ -16,7 +16,7 @@ from manitwin.errors import Rejected
 from manitwin.geometry.pixel_boxes import PixelBox
 from manitwin.models.matting.matte import TRANSPARENT_SHARE
 from manitwin.pipeline.cutout import SHOWN_PX
-from manitwin.pipeline.given_alpha import Given
+from manitwin.pipeline.given_alpha import CutOutInput
 from manitwin.pipeline.stated_place import window_of
 
 DRAWN = "outline"
@@ -91,7 +91,7 @@ def why_no_outline(mask: np.ndarray) -> str | None:
     return "covers the whole photo" if (~mask).mean() <= TRANSPARENT_SHARE else None
 
 
-def as_drawn(given: Given, drawn: DrawnOutline, name: str) -> Given:
+def cut_by_outline(given: CutOutInput, drawn: DrawnOutline, name: str) -> CutOutInput:
     """Return an image cut out by a drawn outline, regardless of its own alpha channel.
 
     Raises Rejected if the outline has another aspect ratio, is empty, or covers the whole image.
@@ -102,7 +102,7 @@ def as_drawn(given: Given, drawn: DrawnOutline, name: str) -> Given:
     if (why := why_no_outline(drawn.mask)) is not None:
         raise _refused(f"{name}: the outline that {drawn.source} drew {why}; {_REMEDY}")
     alpha = drawn.scaled((height, width))
-    return Given(np.dstack([given.pixels[..., :3], alpha]), (f"cut out as {drawn.source} drew its outline",))
+    return CutOutInput(np.dstack([given.pixels[..., :3], alpha]), (f"cut out as {drawn.source} drew its outline",))
 
 
 def mask_file(drawn: DrawnOutline, size_px: tuple[int, int], box_px: PixelBox | None) -> bytes | None:

@@ -16,15 +16,15 @@ from manitwin.geometry.boxes import extents_along_sides
 from manitwin.geometry.grasp_diversity import farthest_grasps
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.pipeline.grasps import GRASP_POINTS
-from manitwin.pipeline.guesses import filled_in
-from manitwin.pipeline.human_corrections import said_name
+from manitwin.pipeline.guesses import template_fill_note
+from manitwin.pipeline.human_corrections import corrected_name
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.joint_checks import joint_checks
 from manitwin.pipeline.object_state import load_hulls, load_solid, load_visual, object_name
 from manitwin.pipeline.quality import quality_checks
 from manitwin.render.card import CardText, make_card
 from manitwin.render.card_panels import CardGrasp, CardPoint
-from manitwin.render.center_of_mass import MassCenter
+from manitwin.render.center_of_mass import CenterOfMass
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.grasp_table import read_grasp_table
 
@@ -52,7 +52,7 @@ class FinishStage:
         """Draw the card of an accepted twin."""
         photo = np.asarray(Image.open(draft.path("photo.png"))) if "photo.png" in draft.paths else None
         physical = draft.field("physical")
-        mass = MassCenter(np.array(physical["center_of_mass_m"]), float(physical["center_of_mass_uncertainty_m"]))
+        mass = CenterOfMass(np.array(physical["center_of_mass_m"]), float(physical["center_of_mass_uncertainty_m"]))
         solid = load_solid(draft.path("solid.npz"))
         card = make_card(
             parts=load_visual(draft.path("visual.glb")),
@@ -118,10 +118,10 @@ def card_text(draft: Draft[Item], solid: trimesh.Trimesh) -> CardText:
         ("grasps held", f"{grasps['verified']} of {grasps['simulated']}"),
     )
     made_by = f"made by {draft.field('generation')['generator']}" if "generation" in draft.fields else "mesh given"
-    said, seen = (draft.fields.get("naming") or {}).get("name"), filled_in(draft)
+    said, seen = (draft.fields.get("naming") or {}).get("name"), template_fill_note(draft)
     if said is not None and said == object_name(draft):
         made_by += f"   named by {draft.field('naming')['probability']['source']}"
-    elif (stated := said_name(draft)) is not None and stated.value == object_name(draft):
+    elif (stated := corrected_name(draft)) is not None and stated.value == object_name(draft):
         made_by += f"   named by {stated.source}"
     elif seen is not None:
         made_by += f"   template by {seen['source']}"

@@ -13,7 +13,7 @@ from stat import S_ISDIR, S_ISREG
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES, named_file, spellings
 from manitwin.pipeline.inspection import NotInspected, are_imported, are_twins, names_of, why_no_inputs
 from manitwin.pipeline.listing_remarks import listing_remarks
-from manitwin.pipeline.masks_beside import masks_beside
+from manitwin.pipeline.mask_matching import match_masks
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH
 
 Told = Callable[[str], None]
@@ -97,7 +97,7 @@ def list_folder(folder: Path, told: Told = lambda said: None) -> FolderListing:
     others = [name for name in others if name not in parts]
     odd = [name for name in others if _suffix(name) not in IMAGE_SUFFIXES]
     no_image = dict(zip(odd, why_no_inputs([folder / name for name in odd]), strict=True))
-    masks = masks_beside([name for name in others if name not in no_image and not _has_mesh_above(name, mesh_folders)])
+    masks = match_masks([name for name in others if name not in no_image and not _has_mesh_above(name, mesh_folders)])
     parts |= masks
     for name in others:
         reason = no_image.get(name) or _why_texture(name, elsewhere, mesh_folders)
@@ -108,7 +108,7 @@ def list_folder(folder: Path, told: Told = lambda said: None) -> FolderListing:
             beside += [name] if posixpath.dirname(name) in mesh_folders else []
         else:
             left[name] = reason
-    _leave_links_to_listed(folder, found.links, inputs, left)
+    _drop_duplicate_links(folder, found.links, inputs, left)
     whole = {**parts, **found.asset_files}
     return FolderListing(
         folder,
@@ -139,7 +139,7 @@ def _walk(folder: Path, told: Told) -> _Found:
     while level:
         scanned = [(each, entries) for each in level if (entries := _scanned(folder, each, found)) is not None]
         level = []
-        for below, entries in _told_apart(folder, scanned, found):
+        for below, entries in _mark_folder_kinds(folder, scanned, found):
             told(f"{len(found.open):,} files found in {folder.name}")
             for entry in entries:
                 name = posixpath.join(below.name, entry.name)
@@ -163,7 +163,7 @@ def _scanned(folder: Path, below: _Folder, found: _Found) -> list[os.DirEntry[st
 _Scanned = tuple[_Folder, list[os.DirEntry[str]]]
 
 
-def _told_apart(folder: Path, scanned: list[_Scanned], found: _Found) -> list[_Scanned]:
+def _mark_folder_kinds(folder: Path, scanned: list[_Scanned], found: _Found) -> list[_Scanned]:
     """Return the folders, with those of twins marked as closed and those of imported assets marked as such."""
     names = {below.name: {entry.name for entry in entries} for below, entries in scanned}
     open_ = [below.name for below, _ in scanned if below.closed is None and below.asset is None]
@@ -189,7 +189,7 @@ def _sort_in(entry: os.DirEntry[str], name: str, closed: str | None, asset: str 
         if name != posixpath.join(asset, IMPORTED_MESH):
             found.asset_files[name] = asset
         return
-    reason = closed or _no_file(entry)
+    reason = closed or _irregular_file_reason(entry)
     if reason is not None:
         found.closed[name] = reason
         return
@@ -198,7 +198,7 @@ def _sort_in(entry: os.DirEntry[str], name: str, closed: str | None, asset: str 
         found.links[name] = os.path.realpath(entry.path)
 
 
-def _no_file(entry: os.DirEntry[str]) -> str | None:
+def _irregular_file_reason(entry: os.DirEntry[str]) -> str | None:
     """Return why an entry that is not a folder is not a regular file either; None if it is one."""
     try:
         mode = entry.stat().st_mode
@@ -272,7 +272,7 @@ def _has_mesh_above(name: str, mesh_folders: set[str]) -> bool:
     return False
 
 
-def _leave_links_to_listed(folder: Path, links: dict[str, str], inputs: list[str], left: dict[str, str]) -> None:
+def _drop_duplicate_links(folder: Path, links: dict[str, str], inputs: list[str], left: dict[str, str]) -> None:
     """Remove links to files that are inputs already from the inputs."""
     if not links:
         return

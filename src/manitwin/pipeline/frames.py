@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from manitwin.geometry.frames.feature import FeatureFrame, FramedMesh
+from manitwin.geometry.frames.feature_deviation import ON_FEATURE_M, feature_deviation_m
 from manitwin.geometry.frames.find import find_frame
-from manitwin.geometry.frames.on_feature import ON_FEATURE_M, off_feature_m
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.twin.point_records import FunctionalFrame, FunctionalPoint
 
@@ -27,7 +27,7 @@ def with_frames(points: Sequence[FunctionalPoint], surface: FramedMesh) -> tuple
         if point.frame is None:
             found = find_frame(surface, np.array(point.position_m), np.array(point.normal), point.label)
             if isinstance(found, FeatureFrame):
-                off_m = off_feature_m(
+                off_m = feature_deviation_m(
                     found.kind, found.position_m, found.rotation, found.size_m, surface.samples[0], surface.mesh
                 )
                 if off_m <= max(ON_FEATURE_M, surface.spacing_m):

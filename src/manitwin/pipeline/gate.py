@@ -14,10 +14,10 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.geometry.repair.components import separate_objects
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.descriptions import article
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.protocol import Annotator, QualityVerdict
-from manitwin.models.annotators.words import article
 from manitwin.pipeline.links import read_articulation
 from manitwin.pipeline.object_state import cut_out_photos, load_solid, object_name, read_subject
 from manitwin.pipeline.size_remarks import TRULY_LARGE
@@ -61,12 +61,12 @@ class GateStage:
                 geometry["metric"],
                 self.settings.min_longest_side_m,
                 self.settings.max_longest_side_m,
-                prior=lookup(object_name(draft)),
+                prior=find_prior(object_name(draft)),
                 imported=draft.payload.given is not None,
             ),
             self._check_single_object(draft, solid),
         ]
-        checks += seen_checks(self._verdict(draft, geometry["metric"]))
+        checks += annotator_checks(self._verdict(draft, geometry["metric"]))
         return {"gate": {"checks": [check.model_dump() for check in checks]}}
 
     def _check_single_object(self, draft: Draft, solid: trimesh.Trimesh) -> Check:
@@ -185,7 +185,7 @@ def check_single_object(
     return Check(name="single_object", passed=True, value=float(found.count), limit=1.0, message=message)
 
 
-def seen_checks(verdict: QualityVerdict) -> list[Check]:
+def annotator_checks(verdict: QualityVerdict) -> list[Check]:
     """Convert the annotator's verdict to checks. Raises Rejected if it is negative."""
     if verdict.single_object is False:
         raise Rejected("several_objects", f"not one coherent object in its pictures: {verdict.detail}", "gate")

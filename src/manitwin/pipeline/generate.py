@@ -10,13 +10,13 @@ from PIL import Image
 
 from manitwin.config import GenerateConfig, Resource
 from manitwin.engine.stage import Draft
-from manitwin.models.generators.generated_mesh import as_glb
+from manitwin.models.generators.generated_mesh import convert_to_glb
 from manitwin.models.generators.protocol import GenerationRequest, Generator, PhotoView
 from manitwin.models.generators.run import run_generator
 from manitwin.pipeline.human_corrections import name_by_person
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import likely_names, object_name
-from manitwin.pipeline.photo_groups import told_apart
+from manitwin.pipeline.photo_groups import distinct_names
 from manitwin.pipeline.stated_poses import StatedPoses, poses_of
 
 
@@ -60,7 +60,7 @@ class GenerateStage:
         made = run_generator(
             self.generator, request, folder, settings=self.settings, jobs=draft.jobs, submit_again=self._submit_again
         )
-        content = as_glb(made.path)
+        content = convert_to_glb(made.path)
         made.path.unlink()
         (folder / "generated.glb").write_bytes(content)
         used = len(views) - len(made.notes.get("left_out", [])) if takes_views else 1
@@ -87,7 +87,7 @@ def read_views(draft: Draft[Item], poses: StatedPoses | None = None) -> tuple[Ph
         return ()
     files = draft.payload.files
     turns = draft.payload.turns_deg if poses is None else poses.turns_deg
-    names = told_apart(files)
+    names = distinct_names(files)
     focals_mm = draft.field("matte")["focals_mm"]
     return tuple(
         PhotoView(

@@ -10,7 +10,7 @@ from typing import Any
 
 from manitwin.config import BuildConfig
 from manitwin.errors import Unavailable
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.protocol import Annotator
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generator
 from manitwin.models.registry import backends, create, factory
@@ -28,7 +28,7 @@ def chosen_generator(config: BuildConfig, annotator: Annotator) -> Generator:
     return guided
 
 
-def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
+def make_input_check(config: BuildConfig) -> Callable[[Item], str | None]:
     """Return a function that states why the chosen generator cannot process an item; None if it can.
 
     The generator is created for the first item, and errors in its configuration are raised then.
@@ -36,7 +36,7 @@ def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
 
     @cache
     def asked_with() -> frozenset[Asked]:
-        return _asked_with(create("generator", config.generator, config))
+        return _accepted_inputs(create("generator", config.generator, config))
 
     def why(item: Item) -> str | None:
         if (contradiction := _two_things(item)) is not None:
@@ -48,7 +48,7 @@ def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
             asked, called, other = "image", f"a photo ({Path(item.file).name})", "a text"
         if asked in asked_with():
             return _without_template(config, item.text) if item.text else None
-        able = ", ".join(_generators_asked_with(asked))
+        able = ", ".join(_generators_accepting(asked))
         return (
             f"the generator {config.generator!r} cannot make a mesh from {called}; choose one that can with"
             f" --generator ({able}), or give {other} or a mesh"
@@ -59,7 +59,7 @@ def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
 
 def _two_things(item: Item) -> str | None:
     """Return an error if an item's text and name denote different known objects; otherwise None."""
-    by_text, by_name = (lookup(said) if said else None for said in (item.text, item.name))
+    by_text, by_name = (find_prior(said) if said else None for said in (item.text, item.name))
     if by_text is None or by_name is None:
         return None
     if by_text.shape.split()[0] == by_name.shape.split()[0]:  # a mug may be called a cup
@@ -76,18 +76,18 @@ def _without_template(config: BuildConfig, text: str) -> str | None:
     reason = generator.why_not(text) if hasattr(generator, "why_not") else None
     if reason is None:
         return None
-    able = [name for name in _generators_asked_with("text") if name != generator.name]
+    able = [name for name in _generators_accepting("text") if name != generator.name]
     return f"{reason}; --generator {', '.join(able)} can make other objects from a text"
 
 
-def _asked_with(generator: Any) -> frozenset[Asked]:
+def _accepted_inputs(generator: Any) -> frozenset[Asked]:
     return getattr(generator, "asked_with", IMAGE_OR_TEXT)
 
 
-def _generators_asked_with(asked: str) -> list[str]:
+def _generators_accepting(asked: str) -> list[str]:
     """Return the names of the generators that accept a text, or an image."""
     found = []
     for name in sorted(backends()["generator"]):
         with suppress(Unavailable):  # a package that is not completely installed cannot be chosen
-            found += [name] if asked in _asked_with(factory("generator", name)) else []
+            found += [name] if asked in _accepted_inputs(factory("generator", name)) else []
     return found

@@ -9,8 +9,8 @@ import numpy as np
 
 from manitwin.formats.image_file import MIN_SIDE_PX
 from manitwin.formats.outline_mask import read_mask
-from manitwin.models.annotators.prior_names import lookup
-from manitwin.models.matting.matte import TRANSPARENT_SHARE, DoubtedCutOut, Matte
+from manitwin.models.annotators.prior_names import find_prior
+from manitwin.models.matting.matte import TRANSPARENT_SHARE, DoubtfulMatte, Matte
 from manitwin.pipeline.drawn_border import BORDERED, without_border
 
 OPAQUE = 250
@@ -26,7 +26,7 @@ FRAMED = "its alpha channel frames an upright rectangle, a picture with transpar
 
 
 @dataclass(frozen=True)
-class Given:
+class CutOutInput:
     """The image to be cut out: ``pixels (H, W, 3 or 4) uint8``, findings, and whether its alpha channel is doubtful."""
 
     pixels: np.ndarray
@@ -34,39 +34,39 @@ class Given:
     is_doubted: bool = False
 
 
-def as_given(pixels: np.ndarray, name: str | None) -> Given:
+def interpret_alpha(pixels: np.ndarray, name: str | None) -> CutOutInput:
     """Interpret an image ``(H, W, 3 or 4) uint8`` of an object that the user calls ``name``.
 
     If the opaque region is an upright rectangle with bars around it, the name decides whether that is the object (a book, a
     box) or an image of it, which is then cropped to. It is doubtful without a known name. A border drawn around a photo is cut
     off (``drawn_border``).
     """
-    pixels, findings = usable(pixels)
+    pixels, findings = normalize_alpha(pixels)
     rectangular = is_rectangular(name)
     if pixels.shape[2] == 3 or pixels[..., 3].min() == 255:
         inside = without_border(np.ascontiguousarray(pixels[..., :3]), rectangular)
-        return Given(pixels, findings) if inside is None else Given(inside, (*findings, BORDERED))
+        return CutOutInput(pixels, findings) if inside is None else CutOutInput(inside, (*findings, BORDERED))
     framed = framed_picture(pixels)
     if framed is None:
-        return Given(pixels, findings)
+        return CutOutInput(pixels, findings)
     if rectangular is False:
-        return Given(framed, (*findings, FRAMED))
-    return Given(pixels, findings, is_doubted=rectangular is None)
+        return CutOutInput(framed, (*findings, FRAMED))
+    return CutOutInput(pixels, findings, is_doubted=rectangular is None)
 
 
-def as_masked(pixels: np.ndarray, mask: Path, orientation: int) -> Given:
+def apply_mask(pixels: np.ndarray, mask: Path, orientation: int) -> CutOutInput:
     """Return an image ``(H, W, 3 or 4) uint8`` cut out by the mask file, combined with its own alpha channel.
 
     ``orientation`` is the photo's EXIF orientation. Raises InputError like ``read_mask``.
     """
-    pixels, findings = usable(pixels)
+    pixels, findings = normalize_alpha(pixels)
     alpha = read_mask(mask, pixels.shape[:2], orientation)
     if pixels.shape[2] == 4:
         alpha = np.minimum(alpha, pixels[..., 3])
-    return Given(np.dstack([pixels[..., :3], alpha]), (*findings, f"cut out as its mask says, {mask.name}"))
+    return CutOutInput(np.dstack([pixels[..., :3], alpha]), (*findings, f"cut out as its mask says, {mask.name}"))
 
 
-def usable(pixels: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+def normalize_alpha(pixels: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return an image ``(H, W, 3 or 4) uint8`` with a usable alpha channel or without one, and findings.
 
     A constant channel is dropped. A channel that is opaque nowhere belongs to a faint cut-out (e.g. a glass drawn translucent):
@@ -106,16 +106,16 @@ def framed_picture(pixels: np.ndarray) -> np.ndarray | None:
 
 def is_rectangular(name: str | None) -> bool | None:
     """Return whether objects with a name may have an upright rectangular outline; None for an unknown name."""
-    prior = lookup(name)
+    prior = find_prior(name)
     return None if prior is None else prior.shape in RECTANGULAR_SHAPES
 
 
-def doubted_rectangle(matte: Matte, file: str, name: str | None) -> DoubtedCutOut:
+def doubted_rectangle(matte: Matte, file: str, name: str | None) -> DoubtfulMatte:
     """Return the doubt about a cut-out that is an upright rectangle, if the user's ``name`` for the object is unknown."""
     remedy = (
         "name the object with --name" if name is None else f"the priors have no {name!r}; give a name that they have"
     )
-    return DoubtedCutOut(
+    return DoubtfulMatte(
         "low_confidence_matte",
         f"{file}: its alpha channel is an upright rectangle: either the object (a book, a box) or a picture with"
         f" transparent bars; {remedy}, or crop off the bars",

@@ -65,7 +65,7 @@ class Contacts:
     part: np.ndarray
     share: np.ndarray
 
-    def taken(self, rows: np.ndarray) -> Contacts:
+    def select(self, rows: np.ndarray) -> Contacts:
         """Return the contacts of some rows."""
         return Contacts(*(getattr(self, f.name)[rows] for f in fields(Contacts)))
 
@@ -102,7 +102,7 @@ class PartedSolid:
         with np.load(draft.path(PARTS_FILE)) as arrays:
             labels = arrays["solid"]
         ids = tuple(part["id"] for part in draft.field("parts"))
-        return cls(solid, RayCaster(solid), labels, ids, radius_m, pads_apart_m(gripper))
+        return cls(solid, RayCaster(solid), labels, ids, radius_m, pad_opening_m(gripper))
 
     def contacts(self, gripper_to_object: np.ndarray, depth_m: np.ndarray, width_m: np.ndarray) -> Contacts:
         """Return the contacts of grasps ``(N, 4, 4)``; with rays, only surface within reach of the expected place counts.
@@ -118,7 +118,7 @@ class PartedSolid:
         half_m = width_m[lost] / 2
         wider = self._contacts(middle[lost], half_m, half_m, gripper_to_object[lost], _ALL_OVER_PAD_M)
         met = np.asarray(wider.touches.all(1))
-        found.put(lost[met], wider.taken(met))
+        found.put(lost[met], wider.select(met))
         lost = lost[~met]
         plus_m, minus_m = self._met(middle[lost], gripper_to_object[lost], self.opening_m)
         beside = np.abs(plus_m + minus_m - width_m[lost]) <= REACH_M  # as wide as stated, but off-centre
@@ -170,7 +170,7 @@ class PartedSolid:
         names = np.array([*self.part_ids, *[NOBODY] * (NO_PART + 1 - len(self.part_ids))])
         return np.asarray(names[index])
 
-    def served(self, contacts: Contacts, places_m: np.ndarray) -> np.ndarray:
+    def assign_places(self, contacts: Contacts, places_m: np.ndarray) -> np.ndarray:
         """Return the index of the place ``(P, 3)`` that each grasp serves ``(N,)``; -1 for none.
 
         A fingertip must touch the place's own part within the radius; the nearest of several places counts. A part that is
@@ -204,7 +204,7 @@ class PartedSolid:
         return {}
 
     def _found_parts_at(self, places_m: np.ndarray) -> np.ndarray:
-        own = self.labels[self._closest.of(places_m)[0]]
+        own = self.labels[self._closest.find_closest(places_m)[0]]
         allowed = np.zeros((len(places_m), NO_PART + 1), bool)
         labels, tree = self._samples
         for row, near in enumerate(tree.query_ball_point(places_m, PAD_M)):
@@ -252,12 +252,12 @@ class PartedSolid:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         if not len(place_m):
             return place_m, np.zeros(0, bool), np.zeros(0, np.uint8), np.zeros(0)
-        face, _ = self._closest.of(place_m)
+        face, _ = self._closest.find_closest(place_m)
         positions, _ = closest_points_on_triangles(place_m, np.asarray(self.solid.triangles)[face])
         return positions, np.ones(len(face), bool), self.labels[face], np.ones(len(face))
 
 
-def pads_apart_m(gripper: Gripper) -> float | None:
+def pad_opening_m(gripper: Gripper) -> float | None:
     """Return the distance of a parallel gripper's pads before closing; None for other hands."""
     return gripper.opening_m if isinstance(gripper, ParallelGripper) else None
 
@@ -288,5 +288,5 @@ def region_columns(
     for name, points in (("functional_point_id", functional), ("grasp_point_id", grasp)):
         ids = np.array([*(point["id"] for point in points), NOBODY])
         places = np.array([point["position_m"] for point in points], float).reshape(-1, 3)
-        columns[name] = ids[held.served(contacts, places)]
+        columns[name] = ids[held.assign_places(contacts, places)]
     return columns

@@ -23,7 +23,7 @@ from manitwin.pipeline.link_grasps import ChosenLink
 from manitwin.pipeline.object_state import JOINTS, load_hulls, load_solid, read_given
 from manitwin.pipeline.point_search import HOPELESS_TRIES
 from manitwin.pipeline.proposals import (
-    Kept,
+    ScreenedProposals,
     associate,
     on_support,
     propose_in_rounds,
@@ -131,7 +131,7 @@ class GraspsStage:
     def _write(
         self,
         path: Path,
-        kept: Kept,
+        kept: ScreenedProposals,
         chosen: np.ndarray,
         given: list[str],
         seed: int,
@@ -164,7 +164,7 @@ def grasp_request(draft: Draft, points: dict[str, Any], gripper: Gripper, settin
         seed=draft.seed,
         grasp_points_m=positions_of(points["grasp"]),
         grasp_types=tuple(p["type"] for p in points["grasp"]),
-        supports=picked_from(draft.field("placements")),
+        supports=pick_support_poses(draft.field("placements")),
     )
 
 
@@ -185,7 +185,7 @@ def proposal_arrays(grasps: GraspProposals, proposer: list[str]) -> dict[str, np
     }
 
 
-def picked_from(placements: list[dict[str, Any]]) -> tuple[np.ndarray, ...]:
+def pick_support_poses(placements: list[dict[str, Any]]) -> tuple[np.ndarray, ...]:
     """Return ``object_to_plane (4, 4)`` of the placements from which robots will pick the object.
 
     These are the most probable stable placement, and the most probable upright one.
@@ -200,7 +200,7 @@ def picked_from(placements: list[dict[str, Any]]) -> tuple[np.ndarray, ...]:
 
 
 def support_quotas(
-    kept: Kept, near: np.ndarray, gripper: Gripper, supports: Sequence[np.ndarray], settings: GraspConfig
+    kept: ScreenedProposals, near: np.ndarray, gripper: Gripper, supports: Sequence[np.ndarray], settings: GraspConfig
 ) -> list[Quota]:
     """Request for each support its share of grasps near a point that clear the support plane and are fit, and a few others.
 
@@ -218,7 +218,7 @@ def support_quotas(
     return [quota for free in members for quota in ((free & kept.merits.fit, count), (free, few))]
 
 
-def _at_points(kept: Kept, near: np.ndarray, count: int, settings: GraspConfig) -> list[Quota]:
+def _at_points(kept: ScreenedProposals, near: np.ndarray, count: int, settings: GraspConfig) -> list[Quota]:
     """Request at each of the last ``count`` points (the grasp points) the grasps that should hold there, with a margin.
 
     Only fit grasps are requested: if all grasps there demand too much of the pads, many trials would not tell more than a few.
@@ -231,7 +231,7 @@ def _at_points(kept: Kept, near: np.ndarray, count: int, settings: GraspConfig) 
     return [(is_near & within & kept.merits.fit & (nearest == point), wanted) for point in range(count)]
 
 
-def _likely(kept: Kept, near: np.ndarray, quotas: list[Quota], count: int) -> np.ndarray:
+def _likely(kept: ScreenedProposals, near: np.ndarray, quotas: list[Quota], count: int) -> np.ndarray:
     """Select ``count`` of the grasps at ``near``, with at least the requested number of each quota as far as available.
 
     Grasps that fill one quota count for the next. If the quotas exceed ``count`` in total, the first ones take precedence.
@@ -249,7 +249,7 @@ def _likely(kept: Kept, near: np.ndarray, quotas: list[Quota], count: int) -> np
     return np.sort(np.concatenate([sure, _select(kept, rest, count - len(sure))]))
 
 
-def _select(kept: Kept, among: np.ndarray, count: int) -> np.ndarray:
+def _select(kept: ScreenedProposals, among: np.ndarray, count: int) -> np.ndarray:
     if not len(among) or count <= 0:
         return among[:0]
     some = kept.proposals.take(among)

@@ -7,9 +7,9 @@ from typing import Any, cast
 
 from manitwin.engine.stage import Draft
 from manitwin.models.annotators.likely_names import OF_LIKELY_NAMES
-from manitwin.models.annotators.prior_names import names_with, normalised
+from manitwin.models.annotators.prior_names import names_with, normalise_name
 from manitwin.models.annotators.priors import load_priors
-from manitwin.pipeline.human_corrections import SIZE, corrected_category, said_name
+from manitwin.pipeline.human_corrections import SIZE, corrected_category, corrected_name
 from manitwin.twin.record_values import Check
 
 PRIOR = "prior:"
@@ -35,13 +35,13 @@ def naming_checks(draft: Draft) -> list[Check]:
 
     For an input that a person has named later, it states who; empty for other inputs.
     """
-    said = None if corrected_category(draft) is not None else said_name(draft)
+    said = None if corrected_category(draft) is not None else corrected_name(draft)
     if said is not None:
         return [Check(name="named", passed=True, value=said.value, message=f"{said.source} says what it is")]
     naming = draft.fields.get("naming")
     if naming is None:
         return []
-    filled, known = filled_in(draft), (draft.fields.get("generation") or {}).get("known")
+    filled, known = template_fill_note(draft), (draft.fields.get("generation") or {}).get("known")
     if filled is not None and filled["category"] is not None and known is not None:
         message = f"{filled['source']} takes it for a {known['name']}; --name overrules it"
         return [Check(name="named", passed=True, value=str(known["name"]), message=message)]
@@ -78,7 +78,7 @@ def unknown_size_words(size: dict[str, Any]) -> str:
     return f"{value} cm is what is {usual} ({low} to {high} cm)"
 
 
-def unsaid_size_words(draft: Draft) -> str | None:
+def typical_size_words(draft: Draft) -> str | None:
     """Describe that the size is only typical of such objects; None if it was stated."""
     size = draft.fields.get("size")
     if size is None or not size["source"].startswith(PRIOR):
@@ -92,7 +92,7 @@ def unknown_name_words(name: str, remedy: str = "say what kind of thing it is wi
     ``remedy`` is appended if there are no such names.
     """
     known = sorted({word for prior in load_priors().values() for word in (prior.category, *prior.aliases)})
-    near = names_with(name)[:MOST_NAMES] or get_close_matches(normalised(name), known, n=2, cutoff=SPELT_ALIKE)
+    near = names_with(name)[:MOST_NAMES] or get_close_matches(normalise_name(name), known, n=2, cutoff=SPELT_ALIKE)
     *others, last = map(repr, near) if near else ("",)
     meant = f"{', '.join(others)} or {last}" if others else last
     asked = f"; did you mean {meant}?" if near else f"; {remedy}"
@@ -104,7 +104,7 @@ def likeliest_words(naming: dict[str, Any]) -> str:
     return ", ".join(f"{guess['name']} {100 * guess['probability']:.0f} %" for guess in naming["likeliest"])
 
 
-def filled_in(draft: Draft) -> dict[str, Any] | None:
+def template_fill_note(draft: Draft) -> dict[str, Any] | None:
     """Return the generator's note on a template that a model filled in; None if there is none."""
     generation = draft.fields.get("generation") or {}
     return cast(dict[str, Any] | None, generation.get("notes", {}).get("filled"))
@@ -112,7 +112,7 @@ def filled_in(draft: Draft) -> dict[str, Any] | None:
 
 def template_checks(draft: Draft) -> list[Check]:
     """Return checks on how a template was filled in: by a model, else by the words of a text."""
-    filled = filled_in(draft)
+    filled = template_fill_note(draft)
     return _unused_words_checks(draft) if filled is None else [_filled_check(filled)]
 
 

@@ -28,14 +28,14 @@ STAGES = {
 """The stages that read each correction; a category acts as a name, like the user's, for all stages after the mesh."""
 NAME = "name"
 NAME_STAGES = ("photo", "name", "generate", "mesh", "gate", *STAGES[CATEGORY])
-"""Key of the amendments that name an input, and their stages: a ``SaidName`` acts like --name, from the photo stage on."""
+"""Key of the amendments that name an input, and their stages: a ``CorrectedName`` acts like --name, from the photo stage on."""
 SIZE_STAGE = "mesh"
 """Its amendment ``SIZE``, an Estimate, is the longest side as in --longest-side; the one of ``physical`` is applied
 afterwards.
 """
 
 
-class SaidName(Record):
+class CorrectedName(Record):
     """A name given by a person to an input that was built without a name, or with another; ``source`` is the person."""
 
     value: str
@@ -52,10 +52,10 @@ def corrected_category(draft: Draft[Item]) -> str | None:
     return next((str(each[CATEGORY]) for each in draft.amendments.values() if CATEGORY in each), None)
 
 
-def said_name(draft: Draft[Item]) -> SaidName | None:
+def corrected_name(draft: Draft[Item]) -> CorrectedName | None:
     """Return the name given later by a person, if the running stage reads it."""
     said = next((each[NAME] for each in draft.amendments.values() if NAME in each), None)
-    return None if said is None else SaidName.model_validate(said)
+    return None if said is None else CorrectedName.model_validate(said)
 
 
 def name_by_person(draft: Draft[Item]) -> str | None:
@@ -63,11 +63,11 @@ def name_by_person(draft: Draft[Item]) -> str | None:
     corrected = corrected_category(draft)
     if corrected is not None:
         return corrected
-    said = said_name(draft)
+    said = corrected_name(draft)
     return draft.payload.name if said is None else said.value
 
 
-def said_size(draft: Draft[Item]) -> Estimate | None:
+def corrected_size(draft: Draft[Item]) -> Estimate | None:
     """Return the longest side (m) stated later by a person, if the running stage is the mesh stage."""
     said = draft.amendments.get(SIZE_STAGE, {}).get(SIZE)
     return None if said is None else Estimate.model_validate(said)

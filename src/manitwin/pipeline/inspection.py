@@ -70,9 +70,9 @@ def are_imported(records: Iterable[Path]) -> Iterator[str | None]:
         yield str(found) if isinstance(found, NotInspected) else None
 
 
-def imported(record: Path) -> tuple[str, str | None, str | None]:
+def inspect_import(record: Path) -> tuple[str, str | None, str | None]:
     """Return the name, licence and attribution of an imported asset. Raises UsageError."""
-    found = inspected("read_import", record)
+    found = run_inspection("read_import", record)
     if isinstance(found, NotInspected):
         raise UsageError(f"{record}: {found}")
     name, license_, attribution = found
@@ -81,17 +81,17 @@ def imported(record: Path) -> tuple[str, str | None, str | None]:
 
 def is_image(file: Path) -> bool:
     """Return whether a file contains an image; False if it cannot be inspected."""
-    return inspected("read_kind", file) == "image"
+    return run_inspection("read_kind", file) == "image"
 
 
-def identified(recipe: Recipe, item: Item, frame: int | None) -> tuple[Identity, Rejected | None] | NotInspected:
+def inspect_identity(recipe: Recipe, item: Item, frame: int | None) -> tuple[Identity, Rejected | None] | NotInspected:
     """Return an input's identity, and a rejection if an image's header is invalid; ``frame`` selects a frame of an animation."""
     found: tuple[Identity, Rejected | None] | NotInspected
-    found = inspected("read_identity", recipe, item, frame, limits=WHOLE)
+    found = run_inspection("read_identity", recipe, item, frame, limits=WHOLE)
     return found
 
 
-def inspected(function: str, *arguments: Any, limits: Limits = LIMITS) -> Any:
+def run_inspection(function: str, *arguments: Any, limits: Limits = LIMITS) -> Any:
     """Run a function of this module in the limited process and return its result; NotInspected if it fails."""
     try:
         return run_isolated(f"{_THIS}:{function}", *arguments, limits=limits)
@@ -161,7 +161,7 @@ def read_import(record: Path) -> tuple[str, str | None, str | None]:
     from manitwin.twin.import_record import read_import_record  # 0.5 CPU-seconds to import
 
     given = read_import_record(record)
-    return given.called, given.license, given.attribution
+    return given.prior_key, given.license, given.attribution
 
 
 def read_kind(file: Path) -> str:

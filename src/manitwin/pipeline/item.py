@@ -18,7 +18,7 @@ from manitwin.formats.packed_source import MAX_KEPT_BYTES
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import side_files
 from manitwin.geometry.length_unit import StatedUnit
-from manitwin.pipeline.photo_cameras import masks_of_photos, poses_identity, read_poses
+from manitwin.pipeline.photo_cameras import masks_in_pose_file, poses_identity, read_poses
 from manitwin.twin.import_record import IMPORTED_MESH
 from manitwin.twin.store import sha256_of_json
 
@@ -161,7 +161,7 @@ def masks_of(item: Item) -> list[Path | None]:
     Raises InputError like ``cameras_of_photos``.
     """
     files = [Path(file) for file in item.files]
-    named = [None] * len(files) if item.poses is None else masks_of_photos(files, Path(item.poses))
+    named = [None] * len(files) if item.poses is None else masks_in_pose_file(files, Path(item.poses))
     given = item.masks or ("",) * len(files)
     return [Path(own) if own else mask for own, mask in zip(given, named, strict=True)]
 

@@ -8,11 +8,11 @@ import numpy as np
 import trimesh
 
 from manitwin.engine.stage import Draft
-from manitwin.errors import Rejected, choose_from
+from manitwin.errors import Rejected, unknown_name_message
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
-from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screen, Screened
-from manitwin.pipeline.grasp_regions import PartedSolid, pads_apart_m
+from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screen, ScreenedProposals
+from manitwin.pipeline.grasp_regions import PartedSolid, pad_opening_m
 from manitwin.pipeline.links import face_links, read_articulation
 from manitwin.pipeline.object_state import load_solid
 from manitwin.robots.grippers.gripper import Gripper
@@ -31,7 +31,7 @@ class LinkScreen:
     surface: PartedSolid
     link: str
 
-    def __call__(self, raw: GraspProposals) -> Screened:
+    def __call__(self, raw: GraspProposals) -> ScreenedProposals:
         """Keep the proposals that pass the screen and whose fingertips both touch the link."""
         left = self.screen(raw)
         grasps = left.proposals
@@ -67,11 +67,11 @@ class ChosenLink:
         articulation = read_articulation(draft)
         names = () if articulation is None else tuple(each.name for each in articulation.links)
         if articulation is None or link not in names:
-            said = choose_from("link", link, names) if names else f"no link {link!r}: it is one rigid body"
+            said = unknown_name_message("link", link, names) if names else f"no link {link!r}: it is one rigid body"
             raise Rejected("no_proposal", said, stage="grasps")
         solid = load_solid(draft.path("solid.npz"))
         labels = face_links(draft, articulation, solid)
-        return cls(PartedSolid(solid, RayCaster(solid), labels, names, 0.0, pads_apart_m(gripper)), link)
+        return cls(PartedSolid(solid, RayCaster(solid), labels, names, 0.0, pad_opening_m(gripper)), link)
 
     def focused(self, request: GraspRequest) -> GraspRequest:
         """Return the request with focus points all over the link instead of the selected points, few of which may lie on it."""

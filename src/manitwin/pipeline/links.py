@@ -14,7 +14,7 @@ from manitwin.errors import InputError
 from manitwin.formats.meshes.read import read_mesh
 from manitwin.geometry.articulation import ArticulatedBody
 from manitwin.geometry.mass_properties import solid_mass_properties, with_triangle_slack
-from manitwin.geometry.parts.segmentation import carried_over
+from manitwin.geometry.parts.segmentation import transfer_face_labels
 from manitwin.geometry.poses import transform_points
 from manitwin.geometry.repair.cascade import repair
 from manitwin.geometry.rigid_body import RigidBody
@@ -60,7 +60,7 @@ def face_links(draft: Draft[Item], articulation: Articulation, mesh: trimesh.Tri
     to_object = np.diag([*[_scale(draft)] * 3, 1.0]) @ np.array(draft.field("geometry")["input_to_object"])
     imported = trimesh.Trimesh(transform_points(to_object, vertices), faces, process=False)
     labels = np.repeat(np.array(articulation.link_of_mesh, np.uint8), [len(part.faces) for part in parts])
-    return carried_over(labels, imported, mesh)
+    return transfer_face_labels(labels, imported, mesh)
 
 
 def link_solids(solid: trimesh.Trimesh, labels: np.ndarray, count: int) -> list[trimesh.Trimesh]:

@@ -12,7 +12,7 @@ from typing import Any
 from manitwin.engine.ledger.ledger import LEDGER
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.errors import UsageError
-from manitwin.formats.missing_path import not_there
+from manitwin.formats.missing_path import missing_path_message
 from manitwin.formats.output_folder import require_writable_folder
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
@@ -20,13 +20,13 @@ from manitwin.pipeline.folder_listing import FolderListing, list_folder
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.manifest_item import COLUMNS, forget_folders, item_of, listed_columns, shortened
 from manitwin.pipeline.manifest_rows import manifest_rows
-from manitwin.pipeline.photo_groups import PhotoGroups, one_of_photos
+from manitwin.pipeline.photo_groups import PhotoGroups, group_photos
 from manitwin.pipeline.photo_thinning import thinned_words
 from manitwin.pipeline.refused_inputs import RefusedInputs
 from manitwin.pipeline.stated_place import BOX, MASK, require_one_photo
 from manitwin.pipeline.stated_size import COLUMN as COLUMN_OF_SIZE
 from manitwin.pipeline.stated_size import MEANT
-from manitwin.pipeline.view_inputs import in_order, no_pose_told
+from manitwin.pipeline.view_inputs import missing_pose_messages, order_photos
 from manitwin.twin.dataset_root import DatasetRoot
 
 MANIFEST_SUFFIXES = frozenset({".csv", ".jsonl"})
@@ -129,13 +129,15 @@ def _one_of_views(
     for path in inputs:
         own = list(_given_items([path], defaults, notes, (), False, refusal))
         if Path(path).is_dir():
-            files, without = in_order([Path(item.file or "") for item in own], None if poses is None else Path(poses))
+            files, without = order_photos(
+                [Path(item.file or "") for item in own], None if poses is None else Path(poses)
+            )
             by_file = {Path(item.file or ""): item for item in own}
             own = [by_file[file] for file in files]
-            notes.remarks.extend(no_pose_told(without, poses))
+            notes.remarks.extend(missing_pose_messages(without, poses))
         items += own
     turns = turns_deg(len(items)) if callable(turns_deg) else turns_deg
-    item = one_of_photos(items, turns, "--views", None if poses is None else str(poses))
+    item = group_photos(items, turns, "--views", None if poses is None else str(poses))
     notes.remarks.extend(_thinned(item, "--views"))
     yield item
 
@@ -165,8 +167,8 @@ def _given_items(
         path = Path(given)
         if not os.path.exists(path):
             raise UsageError(
-                f"{shortened(str(given))}: {not_there(str(given))}; give an image, a mesh, a folder, or a .csv or .jsonl"
-                " manifest; put the description of an object behind --text"
+                f"{shortened(str(given))}: {missing_path_message(str(given))}; give an image, a mesh, a folder, or a .csv or"
+                " .jsonl manifest; put the description of an object behind --text"
             )
         if path.is_dir():
             for item in _folder_items(path, str(given), defaults, notes):
@@ -224,7 +226,7 @@ def _manifest_items(
         where = f"{path}:{line}"
         item = None
         with refused.noted():
-            item = None if groups.takes(line, row) else item_of(row, path.parent, defaults, where, unknown)
+            item = None if groups.add(line, row) else item_of(row, path.parent, defaults, where, unknown)
         if item is not None:
             yield from _allowed(item, where, refusal, refused)
     with refused.noted():  # an inconsistent group is reported with the preceding rows, and ends the groups

@@ -8,11 +8,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
-from manitwin.errors import UsageError, choose_from
-from manitwin.formats.missing_path import not_there
+from manitwin.errors import UsageError, unknown_name_message
+from manitwin.formats.missing_path import missing_path_message
 from manitwin.formats.printable import printable_line
 from manitwin.geometry.length_unit import StatedUnit
-from manitwin.pipeline.inspection import imported
+from manitwin.pipeline.inspection import inspect_import
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.stated_place import BOX, MASK, require_of_photo, stated_box_px, stated_mask
 from manitwin.pipeline.stated_size import stated_size_m, with_defaults
@@ -63,12 +63,12 @@ def item_of(
         if not os.path.isfile(path):
             if os.path.isdir(path) and is_imported(Path(path)):
                 return _imported_item(Path(path).resolve(), values, where)
-            what = "not a file" if os.path.exists(path) else not_there(file)
+            what = "not a file" if os.path.exists(path) else missing_path_message(file)
             raise UsageError(f"{where}: {shortened(path)} is {what}; paths are absolute or relative to the manifest")
         file = _resolved(path)
     for key, kind in (("units", StatedUnit), ("up", Up)):
         if values[key] not in get_args(kind):
-            raise UsageError(f"{where}: {choose_from(key, str(values[key]), get_args(kind))}")
+            raise UsageError(f"{where}: {unknown_name_message(key, str(values[key]), get_args(kind))}")
     require_of_photo(values, file, where)
     mask, box_px = stated_mask(values.get(MASK), folder, where), stated_box_px(values.get(BOX), where)
     return Item(
@@ -140,7 +140,7 @@ def _imported_item(folder: Path, values: dict[str, Any], where: str) -> Item:
     """
     longest_side_m = stated_size_m(values, where)
     require_of_photo(values, str(folder / IMPORTED_MESH), where)
-    name, license_, attribution = imported(folder / IMPORT_RECORD)
+    name, license_, attribution = inspect_import(folder / IMPORT_RECORD)
     return Item(
         file=str(folder / IMPORTED_MESH),
         name=values["name"] or name,

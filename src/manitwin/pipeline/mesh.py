@@ -15,7 +15,7 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.read import MeshFile, read_mesh
-from manitwin.formats.meshes.repaired import repaired_parts
+from manitwin.formats.meshes.repaired_parts import repaired_parts
 from manitwin.formats.meshes.source import MeshLimits
 from manitwin.formats.meshes.textures import bake_transform
 from manitwin.formats.printable import printable_line
@@ -26,11 +26,11 @@ from manitwin.geometry.poses import OBJECT_TO_GLTF
 from manitwin.geometry.repair.cascade import RepairResult, repair
 from manitwin.geometry.repair.components import connected_parts
 from manitwin.geometry.repair.welding import weld_equal
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.prior_records import Prior
-from manitwin.pipeline.human_corrections import SIZE, said_size
+from manitwin.pipeline.human_corrections import SIZE, corrected_size
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.object_state import let_go_of_textures, object_name
+from manitwin.pipeline.object_state import drop_cached_textures, object_name
 from manitwin.pipeline.stated_volume import factor_to_hold, stated_volume_m3
 from manitwin.twin.import_record import ImportRecord, read_import_record
 
@@ -64,19 +64,19 @@ class MeshStage:
         """
         generated = _GENERATED in draft.paths
         path = _input_path(draft, generated)
-        let_go_of_textures()
+        drop_cached_textures()
         file = read_mesh(path, limits=self._limits())
-        prior = lookup(object_name(draft))
+        prior = find_prior(object_name(draft))
         unit = _unit(file, draft, generated, prior)
         if not generated:
-            unit = replace(unit, factor=unit.factor * _to_about_stated_size(file, unit.factor, draft))
+            unit = replace(unit, factor=unit.factor * _approximate_size_factor(file, unit.factor, draft))
         to_metres = np.diag([unit.factor] * 3 + [1.0])
         parts = [bake_transform(part, to_metres) for part in file.parts]
         soup = _soup(parts)
         _check_extent(soup, path)
         try:
             with np.errstate(all="ignore"):  # overflows at the limits of double precision; the results are checked
-                said = _said_up(draft, generated), _said_by(draft, generated)
+                said = _stated_up(draft, generated), _stated_up_source(draft, generated)
                 by_convention = prior is not None and not generated and _up_is_convention(draft)
                 result, chosen, to_object = self._solid(soup, file, said, prior, by_convention)
         except (QhullError, np.linalg.LinAlgError) as error:
@@ -94,7 +94,7 @@ class MeshStage:
         if is_stated:
             unit = LengthUnit(larger * unit.factor, True, "user", None)
         geometry = _geometry(file, unit, chosen, result, solid, larger)
-        if (said_by_person := said_size(draft)) is not None:
+        if (said_by_person := corrected_size(draft)) is not None:
             geometry[SIZE] = said_by_person.model_dump()
         known = draft.field("generation").get("known") if generated else None
         if known is not None:
@@ -164,7 +164,7 @@ def _input_path(draft: Draft[Item], generated: bool) -> Path:
     return Path(draft.payload.file)
 
 
-def _to_about_stated_size(file: MeshFile, factor: float, draft: Draft[Item]) -> float:
+def _approximate_size_factor(file: MeshFile, factor: float, draft: Draft[Item]) -> float:
     """Return the factor from the file's longest side (``factor`` m per unit) to the stated length; 1 if none is stated.
 
     Repair uses lengths in metres, such as the wall of an open sheet. The exact scale is applied later, since the object may be
@@ -179,7 +179,7 @@ def _to_about_stated_size(file: MeshFile, factor: float, draft: Draft[Item]) -> 
 
 def _stated_m(draft: Draft[Item]) -> float | None:
     """Return the longest side (m) stated in a review or with the input; None if not stated."""
-    said = said_size(draft)
+    said = corrected_size(draft)
     return draft.payload.longest_side_m if said is None else said.value
 
 
@@ -201,14 +201,14 @@ def _to_stated_size(
     return (1.0, False) if factor is None else (factor, True)
 
 
-def _said_up(draft: Draft[Item], generated: bool) -> Literal["y", "z", "auto"]:
+def _stated_up(draft: Draft[Item], generated: bool) -> Literal["y", "z", "auto"]:
     """Return the up axis stated by the user, or implied by a generator that sets its meshes down."""
     if not generated:
         return draft.payload.up
     return "y" if draft.field("generation").get("rests", False) else "auto"
 
 
-def _said_by(draft: Draft[Item], generated: bool) -> str:
+def _stated_up_source(draft: Draft[Item], generated: bool) -> str:
     """Return the source of the stated up axis: the generator, the import, or the user."""
     if generated:
         return "the generator"
@@ -217,7 +217,7 @@ def _said_by(draft: Draft[Item], generated: bool) -> str:
 
 def _up_is_convention(draft: Draft[Item]) -> bool:
     """Return whether the up axis is only that of an imported asset's world, without points or poses that show its orientation."""
-    return draft.payload.given is not None and not read_import_record(Path(draft.payload.given)).has_places
+    return draft.payload.given is not None and not read_import_record(Path(draft.payload.given)).has_annotated_poses
 
 
 def _unit(file: MeshFile, draft: Draft[Item], generated: bool, prior: Prior | None) -> LengthUnit:

@@ -11,11 +11,11 @@ from PIL import Image
 from manitwin.config import NamingConfig, Resource
 from manitwin.engine.stage import Draft
 from manitwin.geometry.boxes import upright_extents
-from manitwin.models.classifiers.classifier import Named, classify
+from manitwin.models.classifiers.classifier import Classification, classify
 from manitwin.models.classifiers.efficientnet_lite import NAME, WEIGHTS_SHA256
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name, pictures
-from manitwin.render.grounds import shown_object
+from manitwin.render.background_colors import foreground_mask
 from manitwin.twin.record import Likely, Naming
 
 VIEWS_FROM_ABOVE = (0, 1, 2, 4, 5, 6)
@@ -64,12 +64,12 @@ def known_length_m(draft: Draft[Item]) -> float | None:
 
 def cut_view(picture: np.ndarray) -> np.ndarray:
     """Return a view ``(H, W, 3) uint8`` of a mesh as RGBA ``(H, W, 4)``, opaque where it differs from the plain background."""
-    away = shown_object(picture)
+    away = foreground_mask(picture)
     alpha = away if away.any() else np.ones_like(away)
     return np.dstack([picture, np.where(alpha, 255, 0).astype(np.uint8)])
 
 
-def to_record(named: Named) -> Naming:
+def to_record(named: Classification) -> Naming:
     """Return the record of a name for twin.json."""
     return Naming(
         name=named.name,

@@ -68,7 +68,7 @@ def _loaded(kind: str, path: Path, read: Callable[[bytes], list[trimesh.Trimesh]
     return meshes
 
 
-def let_go_of_textures() -> None:
+def drop_cached_textures() -> None:
     """Drop cached meshes with textures before reading a new input, whose full textures are four times as large as most twins'."""
     known = _meshes["visual"]
     for digest in [digest for digest, each in known.items() if _texture_pixels([each])]:

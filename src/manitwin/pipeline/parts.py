@@ -12,10 +12,10 @@ import trimesh
 from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
 from manitwin.geometry.distance import closest_faces
-from manitwin.geometry.parts.segmentation import carried_over, segmented
+from manitwin.geometry.parts.segmentation import segment_by_rule, transfer_face_labels
 from manitwin.geometry.parts.shape import measure_shape
 from manitwin.models.annotators.part_names import part_name
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.pipeline.object_state import load_solid, load_visual, object_name, read_given
 from manitwin.twin.part_records import NO_PART, Part
@@ -25,7 +25,7 @@ PARTS_FILE = "parts.npz"
 
 
 @dataclass(frozen=True)
-class _Told:
+class _PartLabels:
     """The parts of both meshes as indices into ``names``, with source and confidence."""
 
     names: tuple[str, ...]
@@ -56,17 +56,21 @@ class PartsStage:
         visual = trimesh.Trimesh(
             *trimesh.util.append_faces([m.vertices for m in meshes], [m.faces for m in meshes]), process=False
         )
-        told = _given(draft, solid, visual) or _by_form(draft, solid, visual) or _nothing(solid, visual)
+        told = (
+            _template_parts(draft, solid, visual)
+            or _parts_by_shape(draft, solid, visual)
+            or _without_parts(solid, visual)
+        )
         np.savez(folder / PARTS_FILE, visual=told.visual, solid=told.solid)
         return {"parts": [part.model_dump() for part in table_of(told.names, told.visual, visual, told)]}
 
 
-def _nothing(solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _Told:
+def _without_parts(solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _PartLabels:
     none = [np.full(len(mesh.faces), NO_PART, np.uint8) for mesh in (visual, solid)]
-    return _Told((), none[0], none[1], "geometry", 0.0)
+    return _PartLabels((), none[0], none[1], "geometry", 0.0)
 
 
-def _given(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _Told | None:
+def _template_parts(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _PartLabels | None:
     """Return the parts of which the object was built; None if they are unknown, or repair has changed the faces."""
     given = read_given(draft)
     if given is None or given.parts is None or len(given.parts.of_face) != len(visual.faces):
@@ -75,10 +79,10 @@ def _given(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _To
     used = np.unique(of_face)
     labels = np.searchsorted(used, of_face).astype(np.uint8)
     names = tuple(given.parts.names[i] for i in used)
-    return _Told(names, labels, carried_over(labels, visual, solid), given.source, 1.0)
+    return _PartLabels(names, labels, transfer_face_labels(labels, visual, solid), given.source, 1.0)
 
 
-def _by_form(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _Told | None:
+def _parts_by_shape(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _PartLabels | None:
     """Return the parts found by the rule for the object's form; None if it has no rule, or the surface does not show them."""
     usual = _prior(draft)
     if usual is None or usual.parts is None:
@@ -88,10 +92,10 @@ def _by_form(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _
     prior = usual.of_shape(shape)
     if prior.parts is None:
         return None
-    found = segmented(solid, shape, prior.parts)
+    found = segment_by_rule(solid, shape, prior.parts)
     if found is None:
         return None
-    of_visual = carried_over(found.role, solid, visual)
+    of_visual = transfer_face_labels(found.role, solid, visual)
     shown = np.unique(of_visual)
     points = draft.field("points")
     said = [*points["functional"], *(point for point in points["grasp"] if point["label"])]
@@ -103,12 +107,12 @@ def _by_form(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _
     )
     places = np.full(len(found.roles), NO_PART, np.uint8)
     places[shown] = np.arange(len(shown))
-    return _Told(names, places[of_visual], places[found.role], f"geometry:{prior.parts}", found.confidence)
+    return _PartLabels(names, places[of_visual], places[found.role], f"geometry:{prior.parts}", found.confidence)
 
 
 def _prior(draft: Draft) -> Prior | None:
     """Return the prior of the object's name, else of the category assigned to it."""
-    return lookup(object_name(draft)) or lookup(draft.field("language")["category"])
+    return find_prior(object_name(draft)) or find_prior(draft.field("language")["category"])
 
 
 def parts_at(points_m: np.ndarray, mesh: trimesh.Trimesh, labels: np.ndarray) -> np.ndarray:
@@ -118,7 +122,7 @@ def parts_at(points_m: np.ndarray, mesh: trimesh.Trimesh, labels: np.ndarray) ->
     return np.asarray(labels[closest_faces(points_m, mesh)[0]])
 
 
-def table_of(names: tuple[str, ...], labels: np.ndarray, visual: trimesh.Trimesh, told: _Told) -> list[Part]:
+def table_of(names: tuple[str, ...], labels: np.ndarray, visual: trimesh.Trimesh, told: _PartLabels) -> list[Part]:
     """Return the table of parts with their share of the visual surface and their centroids."""
     areas = np.asarray(visual.area_faces)
     rows = []

@@ -16,16 +16,16 @@ from manitwin.geometry.pixel_boxes import PixelBox
 from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
 from manitwin.models.matting.candidates import network_makers
 from manitwin.models.matting.learned import Network
-from manitwin.models.matting.matte import DoubtedCutOut, Matte, matte_photo
+from manitwin.models.matting.matte import DoubtfulMatte, Matte, matte_photo
 from manitwin.models.matting.object_network import built_in_model
 from manitwin.models.matting.outline_network import outline_model
 from manitwin.pipeline.box_check import require_in_box
 from manitwin.pipeline.cutout import confirmed_or_rejected
-from manitwin.pipeline.drawn_outline import DrawnOutline, as_drawn, drawn_outline
+from manitwin.pipeline.drawn_outline import DrawnOutline, cut_by_outline, drawn_outline
 from manitwin.pipeline.given_alpha import doubted_rectangle
 from manitwin.pipeline.human_corrections import name_by_person
 from manitwin.pipeline.item import Item, masks_of
-from manitwin.pipeline.photo_groups import copies_told, told_apart
+from manitwin.pipeline.photo_groups import distinct_names, identical_file_messages
 from manitwin.pipeline.photo_pixels import pixels_of_photo
 from manitwin.pipeline.stated_place import as_box
 
@@ -68,7 +68,7 @@ class PhotoStage:
         self,
         path: Path,
         name: str | None,
-        confirmed: Callable[[DoubtedCutOut], Matte],
+        confirmed: Callable[[DoubtfulMatte], Matte],
         called: str | None = None,
         mask: Path | None = None,
         box_px: PixelBox | None = None,
@@ -82,7 +82,7 @@ class PhotoStage:
         """
         settings, file = self.settings, called or path.name
         photo = pixels_of_photo(path, name, settings, mask=mask, box_px=box_px)
-        given = photo.given if drawn is None else as_drawn(photo.given, drawn, file)
+        given = photo.given if drawn is None else cut_by_outline(photo.given, drawn, file)
         try:
             matte = matte_photo(
                 given.pixels,
@@ -99,7 +99,7 @@ class PhotoStage:
                 raise doubted_rectangle(matte, file, name)
             if photo.box_px is not None and drawn is None:
                 require_in_box(matte, photo.box_px, file)
-        except DoubtedCutOut as doubted:
+        except DoubtfulMatte as doubted:
             matte = confirmed(doubted)
         return np.ascontiguousarray(matte.rgba), {
             "method": matte.method,
@@ -139,10 +139,10 @@ class PhotosStage(PhotoStage):
         doubts: list[Rejected] = []
         files, masks, name = draft.payload.files, masks_of(draft.payload), name_by_person(draft)
         amendment = draft.amendments.get(self.name, {})
-        for number, (file, called, mask) in enumerate(zip(files, told_apart(files), masks, strict=True)):
+        for number, (file, called, mask) in enumerate(zip(files, distinct_names(files), masks, strict=True)):
             try:
                 drawn = drawn_outline(amendment, called, number)
-                rgba, field = self.cut_out(Path(file), name, refused, called, mask, drawn=drawn)
+                rgba, field = self.cut_out(Path(file), name, reject_doubted, called, mask, drawn=drawn)
             except InputError:  # not a photo: the input is not what was intended
                 raise
             except Rejected as answer:
@@ -160,7 +160,7 @@ class PhotosStage(PhotoStage):
         findings = [f"{called}: {finding}" for called, field in kept for finding in field["findings"]]
         worst = min((field for _, field in kept), key=lambda field: field["confidence"])
         matte = worst | {
-            "findings": [*copies_told(draft.payload.files), *left_out, *findings],
+            "findings": [*identical_file_messages(draft.payload.files), *left_out, *findings],
             "photos": [field["confidence"] for _, field in kept],
         }
         matte["focals_mm"] = [field["focal_mm"] for _, field in kept]
@@ -169,7 +169,7 @@ class PhotosStage(PhotoStage):
         return {"matte": matte}
 
 
-def refused(doubted: DoubtedCutOut) -> Matte:
+def reject_doubted(doubted: DoubtfulMatte) -> Matte:
     """Raise the doubt about a cut-out that no reviewer can confirm."""
     raise doubted
 

@@ -27,7 +27,7 @@ def without_pose(photos: Sequence[Path], poses: Path) -> list[Path]:
     found = read_poses(poses)
     return [
         photo
-        for photo, camera in zip(photos, cameras_of(photos, found.cameras, called(found)), strict=True)
+        for photo, camera in zip(photos, cameras_of(photos, found.cameras, pose_file_label(found)), strict=True)
         if camera is None
     ]
 
@@ -51,7 +51,7 @@ def poses_identity(photos: Sequence[Path], poses: Path) -> list[object]:
     return [found.format, found.unit_m, cameras]
 
 
-def masks_of_photos(photos: Sequence[Path], poses: Path) -> list[Path | None]:
+def masks_in_pose_file(photos: Sequence[Path], poses: Path) -> list[Path | None]:
     """Return the mask that a file of poses names for each photo. Raises InputError like ``cameras_of_photos``."""
     return [camera.mask for camera in cameras_of_photos(photos, read_poses(poses))]
 
@@ -77,7 +77,7 @@ def cameras_of_photos(photos: Sequence[Path], found: CameraPoses) -> list[PosedC
     Raises InputError for a photo without a pose or with another aspect ratio than its pose, and for a mask that is missing or
     of another size than its photo.
     """
-    file = called(found)
+    file = pose_file_label(found)
     cameras = cameras_of(photos, found.cameras, file)
     missing = [photo.name for photo, camera in zip(photos, cameras, strict=True) if camera is None]
     if missing:
@@ -116,7 +116,7 @@ def _require_own(photo: Path, camera: PosedCamera | None, found: CameraPoses) ->
         own = printable_line(camera.file, max_characters=120)
         raise InputError(
             "unreadable",
-            f"{shown}: the pose of this name in {called(found)} belongs to another picture, {own}; give the poses of"
+            f"{shown}: the pose of this name in {pose_file_label(found)} belongs to another picture, {own}; give the poses of"
             " these photos",
         )
 
@@ -127,10 +127,10 @@ def _of_upright(photo: Path, camera: PosedCamera, found: CameraPoses) -> PosedCa
     Pose estimation programs use the image as stored, or as rotated by its EXIF orientation; the aspect ratio tells which.
     """
     width, height, orientation = full_size(photo)
-    file = called(found)
+    file = pose_file_label(found)
     if camera.mask is not None:
         require_mask(camera.mask, found.file.parent, (width, height), orientation)
-    whole = replace(camera, lens=camera.lens.of_picture(width, height))
+    whole = replace(camera, lens=camera.lens.with_picture_size(width, height))
     stated = camera.lens.size_px
     name = printable_line(photo.name, max_characters=120)
     if (
@@ -163,7 +163,7 @@ def _same_shape(size_px: tuple[float, float], stated: tuple[float, float]) -> bo
     return off <= _ROUNDED_PX + _ROUNDED_SHARE * stated[1]
 
 
-def called(found: CameraPoses) -> str:
+def pose_file_label(found: CameraPoses) -> str:
     """Return the name of a file of poses for messages."""
     return printable_line(found.file.name or str(found.file), max_characters=120)
 

@@ -15,7 +15,7 @@ from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.generators.protocol import MOST_PHOTOS
 from manitwin.pipeline.item import Item, file_sha256
-from manitwin.pipeline.photo_thinning import MOST_GIVEN, kept_photos
+from manitwin.pipeline.photo_thinning import MOST_GIVEN, select_photos
 from manitwin.pipeline.stated_place import BOX
 from manitwin.pipeline.stated_poses import poses_of
 
@@ -27,7 +27,7 @@ ToItem = Callable[[dict[str, Any], str], Item]
 """Makes the item of one row; the second argument is the row's location for messages."""
 
 
-def one_of_photos(
+def group_photos(
     items: Sequence[Item], turns_deg: Sequence[float] | None, where: str, poses: str | None = None
 ) -> Item:
     """Return the item of one object shown in the photos of ``items``, in their order.
@@ -42,7 +42,7 @@ def one_of_photos(
         told = f"{meshes[0]} is a mesh" if meshes else "a text is not a photo"
         raise UsageError(f"{where}: {told}; all views of one object must be photos; give a mesh or a text separately")
     files = [str(item.file) for item in items]
-    twice = given_twice(files)
+    twice = first_duplicate(files)
     if twice is not None:
         raise UsageError(f"{where}: {Path(twice).name} is given twice; give each photo once")
     unsaid = turns_deg is None and poses is None
@@ -61,7 +61,7 @@ def one_of_photos(
     if turns and poses is not None:
         raise UsageError(f"{where}: turns and poses both describe the camera; give only one of them")
     try:
-        kept = kept_photos([Path(file) for file in files], turns, None if poses is None else Path(poses))
+        kept = select_photos([Path(file) for file in files], turns, None if poses is None else Path(poses))
     except InputError as error:
         raise UsageError(f"{where}: {error.detail}") from error
     given = None if len(kept) == len(items) else len(items)
@@ -91,12 +91,12 @@ def _posed(items: Sequence[Item], masks: tuple[str, ...], poses: str, where: str
     return item
 
 
-def given_twice(files: Sequence[str]) -> str | None:
+def first_duplicate(files: Sequence[str]) -> str | None:
     """Return the first file that occurs twice; None if there is none."""
     return next((file for number, file in enumerate(files) if file in files[:number]), None)
 
 
-def told_apart(files: Sequence[str]) -> list[str]:
+def distinct_names(files: Sequence[str]) -> list[str]:
     """Return the display names of photos: file names, preceded by as many parent folders as needed to distinguish them."""
     paths = [Path(file).parts for file in files]
     names = []
@@ -107,14 +107,14 @@ def told_apart(files: Sequence[str]) -> list[str]:
     return names
 
 
-def copies_told(files: Sequence[str]) -> list[str]:
+def identical_file_messages(files: Sequence[str]) -> list[str]:
     """Report files with the same content as an earlier one, which is possible for renders of a round object but not for photos.
 
     Raises InputError for an unreadable file.
     """
     first: dict[str, str] = {}
     earlier = [(file, first.setdefault(file_sha256(Path(file)), file)) for file in files]
-    names = dict(zip(files, told_apart(files), strict=True))
+    names = dict(zip(files, distinct_names(files), strict=True))
     return [f"{names[file]}: the same picture as {names[other]}" for file, other in earlier if other != file]
 
 
@@ -129,14 +129,14 @@ class PhotoGroups:
     manifest: Path
     rows: dict[str, list[tuple[int, Row]]] = field(default_factory=lambda: defaultdict(list))
 
-    def takes(self, line: int, row: Row) -> bool:
+    def add(self, line: int, row: Row) -> bool:
         """Store a row if it has a group, and return whether it has. Raises UsageError for a turn or poses without a group."""
-        group = _said(row, "group")
-        if not group and _said(row, "turn_deg"):
+        group = _cell_text(row, "group")
+        if not group and _cell_text(row, "turn_deg"):
             raise UsageError(
                 f"{self.manifest}:{line}: turn_deg needs several photos of one object; give the row a group too"
             )
-        if not group and _said(row, "poses"):
+        if not group and _cell_text(row, "poses"):
             raise UsageError(
                 f"{self.manifest}:{line}: poses need several photos of one object; give their rows a group too"
             )
@@ -147,7 +147,7 @@ class PhotoGroups:
     def items(self, to_item: ToItem) -> Iterator[tuple[Item, str]]:
         """Yield each group's item, and the location of its rows, in the order of their first rows.
 
-        Raises UsageError with the rows if they contradict each other, and like ``one_of_photos``.
+        Raises UsageError with the rows if they contradict each other, and like ``group_photos``.
         """
         for group, rows in self.rows.items():
             shown = printable_line(group, max_characters=60)
@@ -157,10 +157,10 @@ class PhotoGroups:
             known = {column: value for column, value in said.items() if value}
             items = [to_item({**row, **known}, f"{self.manifest}:{line}") for line, row in rows]
             place = None if poses is None else os.path.join(self.manifest.parent, poses)
-            yield one_of_photos(items, _turns(where, rows), where, place), where
+            yield group_photos(items, _turns(where, rows), where, place), where
 
 
-def _said(row: Row, column: str) -> str:
+def _cell_text(row: Row, column: str) -> str:
     value = row.get(column)
     return "" if value is None else str(value).strip()
 
@@ -169,7 +169,7 @@ def _agreed(where: str, column: str, rows: Iterable[tuple[int, Row]]) -> str:
     """Return the value of a column on which all rows with a value agree. Raises UsageError if they differ."""
     values: dict[str, int] = {}
     for line, row in rows:
-        value = _said(row, column)
+        value = _cell_text(row, column)
         if value:
             values.setdefault(value, line)
     if len(values) > 1:
@@ -183,7 +183,7 @@ def _agreed(where: str, column: str, rows: Iterable[tuple[int, Row]]) -> str:
 
 
 def _turns(where: str, rows: Sequence[tuple[int, Row]]) -> list[float] | None:
-    said = {line: _said(row, "turn_deg") for line, row in rows}
+    said = {line: _cell_text(row, "turn_deg") for line, row in rows}
     missing = [line for line, value in said.items() if not value]
     if len(missing) == len(said):
         return None

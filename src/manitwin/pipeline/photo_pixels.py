@@ -12,8 +12,8 @@ from PIL import Image
 from manitwin.config import MattingConfig
 from manitwin.formats.image_file import Photo, full_size, read_image
 from manitwin.formats.outline_mask import require_mask
-from manitwin.geometry.pixel_boxes import PixelBox, to_window
-from manitwin.pipeline.given_alpha import Given, as_given, as_masked
+from manitwin.geometry.pixel_boxes import PixelBox, image_to_crop_box
+from manitwin.pipeline.given_alpha import CutOutInput, apply_mask, interpret_alpha
 from manitwin.pipeline.stated_place import window_of
 
 CROPPED = "looked at within the box that was stated of it"
@@ -26,7 +26,7 @@ class PhotoPixels:
     ``window_px`` is the shown region in pixels of the whole photo; None if a border was cut off.
     """
 
-    given: Given
+    given: CutOutInput
     findings: tuple[str, ...]
     focal_mm: float | None
     box_px: PixelBox | None = None
@@ -45,21 +45,21 @@ def pixels_of_photo(
     if mask is not None:
         require_mask(mask, None, (width, height), orientation)
     if box_px is None:
-        given = as_given(photo.pixels, name) if mask is None else as_masked(photo.pixels, mask, orientation)
+        given = interpret_alpha(photo.pixels, name) if mask is None else apply_mask(photo.pixels, mask, orientation)
         whole = (0.0, 0.0, float(width), float(height)) if given.pixels.shape[:2] == photo.pixels.shape[:2] else None
         return PhotoPixels(given, photo.findings, photo.focal_mm, window_px=whole)
-    masked = None if mask is None else as_masked(photo.pixels, mask, orientation)
+    masked = None if mask is None else apply_mask(photo.pixels, mask, orientation)
     left, top, right, bottom = window_of(box_px, (photo.pixels.shape[1], photo.pixels.shape[0]), path.name)
     window = (float(left), float(top), float(right), float(bottom))
     cropped = (photo.pixels if masked is None else masked.pixels)[top:bottom, left:right]
     scale = min(1.0, settings.photo_side_px / max(cropped.shape[:2]))
     pixels = _scaled(cropped, scale)
-    given = as_given(pixels, name) if masked is None else Given(pixels, masked.findings)
+    given = interpret_alpha(pixels, name) if masked is None else CutOutInput(pixels, masked.findings)
     return PhotoPixels(
         given,
         (*photo.findings, CROPPED),
         _focal_of_window(photo, cropped.shape),
-        to_window(box_px, window, scale),
+        image_to_crop_box(box_px, window, scale),
         window if given.pixels.shape[:2] == pixels.shape[:2] else None,
     )
 

@@ -10,13 +10,13 @@ import numpy as np
 from manitwin.formats.camera_poses.matching import cameras_of
 from manitwin.geometry.even_directions import evenly_spread
 from manitwin.models.generators.protocol import MOST_PHOTOS
-from manitwin.pipeline.photo_cameras import called, read_poses
+from manitwin.pipeline.photo_cameras import pose_file_label, read_poses
 
 MOST_GIVEN = 4096
 """Limit per object: the frames of a two-minute video; each is examined."""
 
 
-def kept_photos(photos: Sequence[Path], turns_deg: Sequence[float], poses: Path | None) -> list[int]:
+def select_photos(photos: Sequence[Path], turns_deg: Sequence[float], poses: Path | None) -> list[int]:
     """Return the numbers of the photos to use, in order: all up to ``MOST_PHOTOS``, otherwise as many, spread evenly.
 
     The directions come from ``turns_deg``, one per photo, or the file ``poses``. All photos are returned if neither is given or
@@ -27,7 +27,7 @@ def kept_photos(photos: Sequence[Path], turns_deg: Sequence[float], poses: Path 
         return every
     if poses is not None:
         found = read_poses(poses)
-        cameras = cameras_of(photos, found.cameras, called(found))
+        cameras = cameras_of(photos, found.cameras, pose_file_label(found))
         directions = [camera.world_to_camera[2, :3] for camera in cameras if camera is not None]
         if len(directions) < len(photos):
             return every

@@ -15,11 +15,11 @@ from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import bake_transform
 from manitwin.geometry.boxes import oriented_bounding_box, upright_extents
 from manitwin.geometry.mass_properties import MassProperties, shell_mass_properties, solid_mass_properties
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.descriptions import article
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.prior_records import Interval, Prior
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
-from manitwin.models.annotators.stated_matter import prior_as_named
-from manitwin.models.annotators.words import article
+from manitwin.models.annotators.stated_matter import prior_in_named_material
 from manitwin.pipeline.annotated_mass import annotated_mass, moments_apart
 from manitwin.pipeline.fill_states import filling_of
 from manitwin.pipeline.human_corrections import SIZE, corrected_estimates, is_human
@@ -86,7 +86,7 @@ class PhysicalStage:
         parts = [bake_transform(part, np.diag([scale, scale, scale, 1.0])) for part in subject.parts]
         _write_meshes(draft, folder, solid, parts, scale, self.settings.max_texture_size)
         properties, uncertainty = spread_mass(solid, mass.value, estimates.wall_thickness_m)
-        by_parts = _known_mass(subject) or self._of_parts(draft, solid, mass.value, estimates)
+        by_parts = _known_mass(subject) or self._mass_from_parts(draft, solid, mass.value, estimates)
         if by_parts is not None:
             off_m = float(np.linalg.norm(by_parts.center_of_mass_m - properties.center_of_mass_m))
             uncertainty = 0.0 if _known_mass(subject) is not None else max(uncertainty, OF_OTHER_MATTER * off_m)
@@ -130,11 +130,11 @@ class PhysicalStage:
         self, subject: Subject, solid: trimesh.Trimesh, mass_kg: float, scale: float, computed: MassProperties
     ) -> MassProperties | None:
         given = subject.given
-        if given is None or given.made_of_parts or given.format == FITTED:
+        if given is None or given.has_part_masses or given.format == FITTED:
             return None
         return annotated_mass(given, solid, mass_kg, scale, computed)
 
-    def _of_parts(
+    def _mass_from_parts(
         self, draft: Draft[Item], solid: trimesh.Trimesh, mass_kg: float, estimates: PhysicalEstimates
     ) -> MassProperties | None:
         """Return mass properties from parts of different materials; None if parts or materials are unknown."""
@@ -144,13 +144,13 @@ class PhysicalStage:
         return mass_by_parts(solid, mass_kg, estimates.part_materials, prior, draft.seed)
 
     def _check_size(self, name: str | None, longest_m: float, said: Estimate | None, to_check: str) -> None:
-        prior = lookup(name)
+        prior = find_prior(name)
         if prior is None or (said is not None and _is_confirmed(said)):
             return
         if not _within(longest_m, prior.longest_axis_m, self.settings.size_margin):
             raise Rejected(
                 "implausible_size",
-                f"{longest_m:.4g} m long, but {_one(prior)} has {_span(prior.longest_axis_m)} m; {to_check}",
+                f"{longest_m:.4g} m long, but {_prior_noun_phrase(prior)} has {_span(prior.longest_axis_m)} m; {to_check}",
             )
 
     def _check_held(self, longest_m: float) -> None:
@@ -167,13 +167,14 @@ class PhysicalStage:
         """Raise Rejected for an implausible mass; ``name`` is None for a template, whose mass is the sum of its parts."""
         if _is_confirmed(mass):
             return
-        prior, as_named = lookup(name), prior_as_named(name)
+        prior, as_named = find_prior(name), prior_in_named_material(name)
         margin = self.settings.mass_margin
         usual = [each.mass_kg for each in (prior, as_named) if each is not None]
         if prior is not None and not any(_within(mass.value, interval, margin) for interval in usual):
             raise Rejected(
                 "implausible_mass",
-                f"{mass.value:.4g} kg, but {_one(prior)} weighs {_span(prior.mass_kg)} kg; check the name{_declared(mass)}",
+                f"{mass.value:.4g} kg, but {_prior_noun_phrase(prior)} weighs {_span(prior.mass_kg)} kg; check the name"
+                f"{_declared(mass)}",
             )
         density = mass.value / volume_m3
         if not self.settings.min_density_kg_m3 <= density <= self.settings.max_density_kg_m3:
@@ -184,7 +185,7 @@ class PhysicalStage:
             )
 
 
-def _one(prior: Prior) -> str:
+def _prior_noun_phrase(prior: Prior) -> str:
     """Return the noun phrase of a prior: an apple, a pair of scissors."""
     counted = f"{prior.counter} {prior.category}" if prior.counter else prior.category
     return f"{article(counted)} {counted}"
@@ -211,7 +212,7 @@ def _declared(mass: Estimate) -> str:
 
 def _prior_of(draft: Draft[Item], estimates: PhysicalEstimates) -> Prior | None:
     """Return the prior of the object's name, else of what an annotator identified it as."""
-    return lookup(object_name(draft)) or lookup(estimates.called)
+    return find_prior(object_name(draft)) or find_prior(estimates.called)
 
 
 def size_scale(subject: Subject, estimates: PhysicalEstimates, longest: float) -> float:
@@ -261,7 +262,7 @@ def _distribution(estimates: PhysicalEstimates, by_parts: MassProperties | None)
 def _known_mass(subject: Subject) -> MassProperties | None:
     """Return the mass properties of a template built from parts with a material each; None for other subjects."""
     known = subject.given
-    if known is None or not known.made_of_parts or known.center_of_mass_m is None or known.inertia_kg_m2 is None:
+    if known is None or not known.has_part_masses or known.center_of_mass_m is None or known.inertia_kg_m2 is None:
         return None
     center, inertia = np.array(known.center_of_mass_m), np.array(known.inertia_kg_m2)
     return MassProperties(center, inertia, float(subject.solid.volume))

@@ -20,10 +20,10 @@ from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.geometry.stable_poses import easiest_tilt, stable_poses
 from manitwin.pipeline.object_state import load_body, load_solid
-from manitwin.twin.resting import rest_of
+from manitwin.twin.resting import classify_rest
 
 if TYPE_CHECKING:
-    from manitwin.physics.sapien.settle import Settled
+    from manitwin.physics.sapien.settle import SettledBody
 
 UP = np.array([0.0, 0.0, 1.0])
 SAME_POSE_DEG = 5.0
@@ -83,16 +83,16 @@ def find_rests(body: RigidBody, settings: PlacementConfig) -> list[_Rest]:
     that trial, as people put down a spoon that way although it rests on little. A body that falls over is tried again from
     where it came to rest. Raises Rejected if nothing is stable.
     """
-    shape = _Shape(body, settings)
+    shape = _PlacementSearch(body, settings)
     guesses, unlikely = shape.guesses()
     firm = [guess for guess in guesses if shape.is_firm(guess.rotation)]
     loose = [guess for guess in guesses if not shape.is_firm(guess.rotation)]
-    rests = shape.tried(firm, loosely=False)
+    rests = shape.simulate_guesses(firm, loosely=False)
     proven = any(rest.settled for rest in rests)
-    rests += shape.tried([guess for guess in loose if not proven or _is_upright(guess)], loosely=True)
+    rests += shape.simulate_guesses([guess for guess in loose if not proven or _is_upright(guess)], loosely=True)
     rests += [guess for guess in loose if proven and not _is_upright(guess)]
     if not any(rest.settled for rest in rests):
-        rests += shape.tried([guess for guess in unlikely if shape.is_firm(guess.rotation)], loosely=False)
+        rests += shape.simulate_guesses([guess for guess in unlikely if shape.is_firm(guess.rotation)], loosely=False)
     rests = [rest for rest in rests if rest.settled or rest.probability >= settings.least_probability]
     rests.sort(key=lambda rest: (not rest.settled, -rest.probability))
     if not rests or not rests[0].settled:
@@ -104,7 +104,7 @@ def find_rests(body: RigidBody, settings: PlacementConfig) -> list[_Rest]:
     return rests[: settings.max_placements - len(upright)] + upright
 
 
-class _Shape:
+class _PlacementSearch:
     """A body's convex hull and its quasi-static poses."""
 
     def __init__(self, body: RigidBody, settings: PlacementConfig):
@@ -150,7 +150,7 @@ class _Shape:
         standing = [guess for guess in guesses if _is_upright(guess)] or [_Rest(np.eye(3), 0.0)]
         return (likely if any(_is_upright(guess) for guess in likely) else [*likely, standing[0]]), unlikely
 
-    def settle(self, rests: list[_Rest], loosely: bool) -> list[tuple[Settled, bool]]:
+    def settle(self, rests: list[_Rest], loosely: bool) -> list[tuple[SettledBody, bool]]:
         """Settle the body in simulation from each pose; return the outcomes, and whether it stayed.
 
         Stability requires staying when released level in two engines, and in the first engine when released tilted by
@@ -195,7 +195,7 @@ class _Shape:
         again = settle_on_plane_in_mujoco(self.plane_body, [pose], drop_m=drop_m, seconds=seconds)[0]
         return self._stayed(again, level, most_rad)
 
-    def _stayed(self, outcome: Settled, level: np.ndarray, most_rad: float, way_back_m: float = 0.0) -> bool:
+    def _stayed(self, outcome: SettledBody, level: np.ndarray, most_rad: float, way_back_m: float = 0.0) -> bool:
         """Return whether a body ended near ``level``, with its centre of mass at most ``way_back_m`` beyond the limit from its
         start.
         """
@@ -211,7 +211,7 @@ class _Shape:
         pivot = offsets[int((offsets @ tilted[2]).argmin())]
         return float(np.linalg.norm(pivot)) * np.radians(NUDGE_DEG)
 
-    def tried(self, guesses: list[_Rest], loosely: bool) -> list[_Rest]:
+    def simulate_guesses(self, guesses: list[_Rest], loosely: bool) -> list[_Rest]:
         """Try each pose in simulation, and again from where the body came to rest, if that pose is no worse.
 
         Poses with hardly any rise on tilting are not tried, as a solver's friction would hold a cylinder.
@@ -221,7 +221,7 @@ class _Shape:
         guesses = [guess for guess in guesses if self.rises_by(guess.rotation, least_rise_m)]
         fallen: list[_Rest] = []
         for guess, (outcome, stayed) in zip(guesses, self.settle(guesses, loosely), strict=True):
-            found = replace(guess, rotation=self.resting(guess, outcome), settled=stayed)
+            found = replace(guess, rotation=self.resting_rotation(guess, outcome), settled=stayed)
             if stayed:
                 _add(rests, found)
             elif outcome.at_rest and self.rises_by(found.rotation, least_rise_m):
@@ -233,7 +233,7 @@ class _Shape:
             _add(rests, replace(found, settled=stayed))
         return rests
 
-    def resting(self, start: _Rest, outcome: Settled) -> np.ndarray:
+    def resting_rotation(self, start: _Rest, outcome: SettledBody) -> np.ndarray:
         """Return the orientation in which the body came to rest, with its initial heading.
 
         It is that of the firmest quasi-static pose within ``SNAP_DEG`` of the final orientation; if the body stayed, the start
@@ -265,7 +265,7 @@ def _add(rests: list[_Rest], found: _Rest) -> None:
 
 
 def _is_upright(rest: _Rest) -> bool:
-    return rest_of(rest.rotation) == "upright"
+    return classify_rest(rest.rotation) == "upright"
 
 
 def _placement(rest: _Rest, outline: np.ndarray, hull_points: np.ndarray) -> dict[str, Any]:

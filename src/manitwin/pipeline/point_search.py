@@ -15,7 +15,7 @@ from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequ
 from manitwin.physics.grasp_selection import select_likely
 from manitwin.physics.trial import TrialResult
 from manitwin.pipeline.grasp_regions import Contacts, PartedSolid
-from manitwin.pipeline.proposals import Kept
+from manitwin.pipeline.proposals import ScreenedProposals
 from manitwin.twin.point_records import GraspPoint
 
 FIRST_POINT_SEED = 100_000
@@ -30,7 +30,7 @@ Try = Callable[[GraspProposals], list[TrialResult]]
 
 
 @dataclass
-class Tried:
+class TriedGrasps:
     """Grasps and their outcomes, row by row."""
 
     grasps: GraspProposals
@@ -51,7 +51,7 @@ class PointSearch:
         screen: Screen,
         settings: GraspConfig,
         held: PartedSolid,
-        tried: Tried,
+        tried: TriedGrasps,
         attempt: Try,
     ):
         """Take the grasper's request, the screen, the settings, the parts, the grasps tried first, and the trial function."""
@@ -68,7 +68,7 @@ class PointSearch:
         mine = self._serves(self._touched, point, others)
         return Counter(outcome for outcome, is_mine in zip(self.tried.outcome, mine, strict=True) if is_mine)
 
-    def short(self, point: GraspPoint, others: list[GraspPoint]) -> bool:
+    def has_shortfall(self, point: GraspPoint, others: list[GraspPoint]) -> bool:
         """Return whether fewer grasps hold at a point than requested."""
         return self.outcomes_at(point, others)["held"] < self.settings.least_per_point
 
@@ -77,7 +77,7 @@ class PointSearch:
         left = self._proposed_at(point, others)
         free = self._belongs(left.proposals, point, others)  # the screen has set their widths to those at the pads
         budget = self.settings.tries_per_point
-        while budget > 0 and free.any() and self.short(point, others):
+        while budget > 0 and free.any() and self.has_shortfall(point, others):
             so_far = self.outcomes_at(point, others)
             if so_far.total() >= HOPELESS_TRIES and so_far["held"] < HOPELESS_SHARE * so_far.total():
                 return
@@ -105,9 +105,9 @@ class PointSearch:
         filters = ", ".join(f"{name} {count}" for name, count in self.passed[point.candidate].items())
         return f"{said}{f' ({counted})' if counted else ''}; proposals there: {filters}"
 
-    def _proposed_at(self, point: GraspPoint, others: list[GraspPoint]) -> Kept:
+    def _proposed_at(self, point: GraspPoint, others: list[GraspPoint]) -> ScreenedProposals:
         """Return the proposals at a point that pass the screen, with further rounds if they are few."""
-        settings, passed, parts = self.settings, Counter[str](), list[Kept]()
+        settings, passed, parts = self.settings, Counter[str](), list[ScreenedProposals]()
         rounds = POINT_ROUNDS if self.grasper.rounds is None else min(1, self.grasper.rounds)
         enough = 2 * settings.tries_per_point
         for number in range(rounds):
@@ -121,12 +121,12 @@ class PointSearch:
             )
             raw = self.grasper.propose(request)
             raw = raw.take(np.flatnonzero(self._belongs(raw, point, others)))
-            parts.append(Kept.screened(raw, self.screen, request.focus_points_m))
+            parts.append(ScreenedProposals.screened(raw, self.screen, request.focus_points_m))
             passed.update(parts[-1].counts)
             if sum(len(part.proposals) for part in parts) >= enough:
                 break
         self.passed[point.candidate] = passed
-        return Kept.joined(parts, parts[0].raw)
+        return ScreenedProposals.joined(parts, parts[0].raw)
 
     def _belongs(self, grasps: GraspProposals, point: GraspPoint, others: list[GraspPoint]) -> np.ndarray:
         """Return which grasps ``(N,)`` serve a point, by fingertip contact, with no other point nearer."""
@@ -134,7 +134,7 @@ class PointSearch:
 
     def _serves(self, contacts: Contacts, point: GraspPoint, others: list[GraspPoint]) -> np.ndarray:
         places = np.array([p.position_m for p in (point, *(p for p in others if p.id != point.id))])
-        return self.held.served(contacts, places) == 0
+        return self.held.assign_places(contacts, places) == 0
 
     def _contacts(self, grasps: GraspProposals) -> Contacts:
         return self.held.contacts(grasps.gripper_to_object, grasps.depth_m, grasps.width_m)

@@ -21,8 +21,8 @@ from manitwin.pipeline.grasps import GRASP_POINTS, PROPOSALS, UNFILTERED, grasp_
 from manitwin.pipeline.gripper_kinds import KINDS
 from manitwin.pipeline.link_grasps import ChosenLink
 from manitwin.pipeline.object_state import JOINTS, load_body
-from manitwin.pipeline.point_search import PointSearch, Tried
-from manitwin.pipeline.tried import POINT_PROPOSALS, POINT_VERDICTS, read_arrays
+from manitwin.pipeline.point_search import PointSearch, TriedGrasps
+from manitwin.pipeline.tried_grasps import POINT_PROPOSALS, POINT_VERDICTS, read_arrays
 from manitwin.pipeline.verify import VERDICTS, confirmation, result_arrays, trial_settings
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.point_records import GraspPoint
@@ -70,14 +70,14 @@ class PointTrialsStage:
             joints = {} if some.joints_rad is None else {"joints_rad": some.joints_rad}
             return self.trial.run(body, self.gripper, some.gripper_to_object, settings, **joints)
 
-        tried = Tried(grasps.take(chosen), verdicts["outcome"][chosen].tolist())
+        tried = TriedGrasps(grasps.take(chosen), verdicts["outcome"][chosen].tolist())
         screen = KINDS[self.gripper.kind].screen(request)
         chosen_link = ChosenLink.read(draft, self.gripper, self.settings.link)
         if chosen_link is not None:
             screen = chosen_link.screened(screen)
         held = PartedSolid.read(draft, self.gripper, self.settings.association_radius_m)
         search = PointSearch(request, self.grasper, screen, self.settings, held, tried, attempt)
-        answered = answer(
+        answered = resolve_grasp_points(
             search,
             [GraspPoint(**point) for point in points["grasp"]],
             [GraspPoint(**point) for point in draft.field("spare_grasp_points")],
@@ -101,7 +101,9 @@ class PointTrialsStage:
         np.savez(folder / POINT_VERDICTS, allow_pickle=False, **joined)
 
 
-def answer(search: PointSearch, points: list[GraspPoint], spares: list[GraspPoint]) -> dict[str, list[dict[str, Any]]]:
+def resolve_grasp_points(
+    search: PointSearch, points: list[GraspPoint], spares: list[GraspPoint]
+) -> dict[str, list[dict[str, Any]]]:
     """Search wherever too few grasps hold; return the points with the number of successful grasps, and the withdrawn points."""
     searched: set[str] = set()
     number = len(points)
@@ -111,7 +113,7 @@ def answer(search: PointSearch, points: list[GraspPoint], spares: list[GraspPoin
     for place, point in enumerate(list(points)):
         if not search.outcomes_at(point, points)["held"]:
             _search_where_short(search, points, searched, [point])  # a new point may have taken over its grasps
-        if search.outcomes_at(point, points)["held"] or not search.short(point, points):
+        if search.outcomes_at(point, points)["held"] or not search.has_shortfall(point, points):
             continue
         others = [p for p in points if p.id != point.id]
         spare = _next_best(search, f"g{number}", others, spares)
@@ -132,13 +134,15 @@ def answer(search: PointSearch, points: list[GraspPoint], spares: list[GraspPoin
 def _next_best(search: PointSearch, name: str, others: list[GraspPoint], spares: list[GraspPoint]) -> GraspPoint | None:
     """Take the first spare point at which enough grasps hold, else the one with the most successes; None if there is none."""
     best, most = None, 0
-    spares.sort(key=lambda spare: search.short(spare, others))  # points with enough successful grasps already go first
+    spares.sort(
+        key=lambda spare: search.has_shortfall(spare, others)
+    )  # points with enough successful grasps already go first
     while spares:
         spare = spares.pop(0).model_copy(update={"id": name})
-        if search.short(spare, others):
+        if search.has_shortfall(spare, others):
             search.search(spare, others)
         held = search.outcomes_at(spare, others)["held"]
-        if not search.short(spare, others):
+        if not search.has_shortfall(spare, others):
             return spare
         if held > most:
             best, most = spare, held
@@ -150,7 +154,7 @@ def _search_where_short(
 ) -> None:
     """Search at those of ``some`` points at which too few grasps hold and that have not been searched."""
     for point in some:
-        if point.id not in searched and search.short(point, points):
+        if point.id not in searched and search.has_shortfall(point, points):
             searched.add(point.id)
             search.search(point, points)
 

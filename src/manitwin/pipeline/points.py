@@ -20,7 +20,7 @@ from manitwin.pipeline.human_corrections import corrected_points
 from manitwin.pipeline.object_state import findings_of, pictures, read_scaled_subject
 from manitwin.pipeline.refinement import marked_at, refined_points
 from manitwin.pipeline.views import write_webp
-from manitwin.render.raycast import merged, seen_tolerance_m
+from manitwin.render.raycast import merge_parts, visibility_tolerance_m
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.point_records import FunctionalPoint, GraspPoint, RefinedCandidate
 
@@ -77,13 +77,13 @@ class PointsStage:
         check_selection(selected, request.positions_m)
         surface = FramedMesh(request.subject.solid, request.center_of_mass_m, draft.seed)
         spares = _spares(selected, request)
-        taken = {point.candidate for point in (*selected.grasp, *spares)} | _moved(selected.functional)
-        looked, seen_nearby, shown = self._looked_at(selected.functional, request, taken)
+        taken = {point.candidate for point in (*selected.grasp, *spares)} | _human_candidates(selected.functional)
+        looked, seen_nearby, shown = self._refine_points(selected.functional, request, taken)
         (folder / "closer").mkdir(parents=True, exist_ok=True)
         for point_id, picture in shown.items():
             write_webp(picture, folder / "closer" / f"closer_{point_id}.webp", WEBP_QUALITY)
         framed, missing = with_frames(looked, surface)
-        functional, refined = refined_points(framed, surface, taken, _on(request.subject))
+        functional, refined = refined_points(framed, surface, taken, _make_surface_test(request.subject))
         marked = {
             row.candidate: row for row in (*refined, *seen_nearby)
         }  # the position in the marked views, before the first move
@@ -98,7 +98,7 @@ class PointsStage:
             "refined_candidates": [marked[candidate].model_dump() for candidate in sorted(marked)],
         }
 
-    def _looked_at(
+    def _refine_points(
         self, points: Sequence[FunctionalPoint], request: PointsRequest, kept: set[int]
     ) -> tuple[list[FunctionalPoint], list[RefinedCandidate], Mapping[str, np.ndarray]]:
         """Return the points as corrected by the annotator in close-up, their positions in the marked views, and its images."""
@@ -126,14 +126,14 @@ def _spares(selected: SelectedPoints, request: PointsRequest) -> list[GraspPoint
     return [*selected.spare, *(spare_grasp_points(request, taken)[:missing] if missing else ())]
 
 
-def _moved(points: Iterable[FunctionalPoint]) -> set[int]:
+def _human_candidates(points: Iterable[FunctionalPoint]) -> set[int]:
     """Return the candidates at which a person has placed points, which are not moved."""
     return {point.candidate for point in points if point.source is not None}
 
 
-def _on(subject: Subject) -> Callable[[np.ndarray], bool]:
+def _make_surface_test(subject: Subject) -> Callable[[np.ndarray], bool]:
     """Return a function that tests whether a position ``(3,)`` lies on the visible surface, as candidates do."""
-    limit_m, corners = seen_tolerance_m(subject.solid.extents), merged(list(subject.parts)).triangles
+    limit_m, corners = visibility_tolerance_m(subject.solid.extents), merge_parts(list(subject.parts)).triangles
 
     def is_seen(place_m: np.ndarray) -> bool:
         nearest, _ = closest_points_on_triangles(np.repeat(place_m[None], len(corners), 0), corners)

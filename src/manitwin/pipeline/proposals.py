@@ -14,7 +14,7 @@ import numpy as np
 from manitwin.config import GraspConfig
 from manitwin.geometry.grasp_diversity import fingertips
 from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest, Screen
-from manitwin.physics.grasp_filters import lowest_points_m, raised
+from manitwin.physics.grasp_filters import lowest_points_m, retract_from_plane
 from manitwin.physics.grasp_selection import Merits
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
@@ -61,7 +61,7 @@ def associate(distance_m: np.ndarray, *, radius_m: float, enough: int, object_si
 
 
 @dataclass(frozen=True)
-class Kept:
+class ScreenedProposals:
     """Grasps that passed the filters, their merits, and their distances from each point ``(N, P)`` m.
 
     ``raw`` are the first round's proposals before filtering; ``counts`` are the numbers of grasps after each filter.
@@ -74,13 +74,13 @@ class Kept:
     counts: dict[str, int]
 
     @classmethod
-    def screened(cls, raw: GraspProposals, screen: Screen, points_m: np.ndarray) -> Kept:
+    def screened(cls, raw: GraspProposals, screen: Screen, points_m: np.ndarray) -> ScreenedProposals:
         """Return the proposals that pass a screen."""
         left = screen(raw)
         return cls(left.proposals, left.merits, distances_to_grasps(points_m, left.proposals), raw, left.counts)
 
     @classmethod
-    def joined(cls, parts: list[Kept], raw: GraspProposals) -> Kept:
+    def joined(cls, parts: list[ScreenedProposals], raw: GraspProposals) -> ScreenedProposals:
         """Return the concatenated grasps of all parts; ``raw`` are those of the whole."""
         return cls(
             GraspProposals.joined([part.proposals for part in parts]),
@@ -91,26 +91,28 @@ class Kept:
         )
 
 
-def propose_in_rounds(request: GraspRequest, grasper: Grasper, screen: Screen, settings: GraspConfig) -> Kept:
+def propose_in_rounds(
+    request: GraspRequest, grasper: Grasper, screen: Screen, settings: GraspConfig
+) -> ScreenedProposals:
     """Propose and filter until ``near_enough`` grasps are within the radius of a point, or the rounds are used up.
 
     More rounds are made while fewer grasps than will be simulated are likely to hold. While fewer than that have passed the
     filters at all, the next round also proposes around those that have.
     """
     points = request.focus_points_m
-    rounds: list[Kept] = []
+    rounds: list[ScreenedProposals] = []
     total = near = likely = 0
     while len(rounds) < _most(grasper, settings, enough=likely >= settings.simulated):
         seed = int(np.random.SeedSequence([request.seed, len(rounds)]).generate_state(1)[0])
         focus = points if not rounds or total >= settings.simulated else _around(points, rounds)
         raw = grasper.propose(replace(request, focus_points_m=focus, seed=seed))
-        rounds.append(Kept.screened(raw, screen, points))
+        rounds.append(ScreenedProposals.screened(raw, screen, points))
         total += len(rounds[-1].proposals)
         likely += int(rounds[-1].merits.likely().sum())
         near += int((rounds[-1].distance_m.min(1) <= settings.association_radius_m).sum())
         if near >= settings.near_enough or total >= settings.max_proposals:
             break
-    kept = Kept.joined(rounds, rounds[0].raw)
+    kept = ScreenedProposals.joined(rounds, rounds[0].raw)
     first = np.arange(min(total, settings.max_proposals))
     return replace(
         kept,
@@ -125,14 +127,14 @@ def _most(grasper: Grasper, settings: GraspConfig, *, enough: bool) -> int:
     return most if grasper.rounds is None else min(most, grasper.rounds)
 
 
-def _around(points: np.ndarray, rounds: list[Kept]) -> np.ndarray:
+def _around(points: np.ndarray, rounds: list[ScreenedProposals]) -> np.ndarray:
     tips = [fingertips(some.proposals.gripper_to_object, some.proposals.depth_m) for some in rounds]
     return np.concatenate([points, *tips])
 
 
 def with_support_rounds(
-    kept: Kept, request: GraspRequest, grasper: Grasper, screen: Screen, settings: GraspConfig
-) -> Kept:
+    kept: ScreenedProposals, request: GraspRequest, grasper: Grasper, screen: Screen, settings: GraspConfig
+) -> ScreenedProposals:
     """Propose until enough grasps near the points clear each of ``request.supports``, or the rounds are used up.
 
     Proposals that would penetrate a support are retracted along their approach. Nothing is changed if there are enough already,
@@ -152,11 +154,13 @@ def with_support_rounds(
             seed = int(np.random.SeedSequence(words).generate_state(1)[0])
             raw = _clear_of(support, gripper, grasper.propose(replace(request, seed=seed)))
             if len(raw):
-                kept = Kept.joined([kept, Kept.screened(raw, screen, request.focus_points_m)], kept.raw)
+                kept = ScreenedProposals.joined(
+                    [kept, ScreenedProposals.screened(raw, screen, request.focus_points_m)], kept.raw
+                )
     return kept
 
 
-def on_support(kept: Kept, gripper: ParallelGripper, support: np.ndarray, radius_m: float) -> np.ndarray:
+def on_support(kept: ScreenedProposals, gripper: ParallelGripper, support: np.ndarray, radius_m: float) -> np.ndarray:
     """Return which grasps ``(N,)`` are near a point and clear a support."""
     near = kept.distance_m.min(1) <= radius_m if len(kept.proposals) else np.zeros(0, bool)
     return near & (lowest_points_m(gripper, kept.proposals.gripper_to_object, support) > 0)
@@ -165,7 +169,7 @@ def on_support(kept: Kept, gripper: ParallelGripper, support: np.ndarray, radius
 def _clear_of(support: np.ndarray, gripper: ParallelGripper, raw: GraspProposals) -> GraspProposals:
     """Return the proposals whose hand clears a support, and others retracted until it does."""
     clear = np.flatnonzero(lowest_points_m(gripper, raw.gripper_to_object, support) > 0)
-    poses, index = raised(gripper, raw.gripper_to_object, support)
+    poses, index = retract_from_plane(gripper, raw.gripper_to_object, support)
     return GraspProposals.joined([raw.take(clear), replace(raw.take(index), gripper_to_object=poses)])
 
 
@@ -201,16 +205,21 @@ def given_proposals(given: ImportRecord, gripper: Gripper, most: int) -> GraspPr
 
 
 def with_given(
-    kept: Kept, given: ImportRecord | None, gripper: Gripper, screen: Screen, request: GraspRequest, most: int
-) -> tuple[Kept, list[str]]:
+    kept: ScreenedProposals,
+    given: ImportRecord | None,
+    gripper: Gripper,
+    screen: Screen,
+    request: GraspRequest,
+    most: int,
+) -> tuple[ScreenedProposals, list[str]]:
     """Prepend the asset's grasps that pass the filters to the proposals; return all, and the proposers of the former."""
     proposals = None if given is None else given_proposals(given, gripper, most)
     if given is None or proposals is None:
         return kept, []
-    passed = Kept.screened(proposals, screen, request.focus_points_m)
+    passed = ScreenedProposals.screened(proposals, screen, request.focus_points_m)
     if not len(passed.proposals):
         return kept, []
-    return Kept.joined([passed, kept], kept.raw), [given.source] * len(passed.proposals)
+    return ScreenedProposals.joined([passed, kept], kept.raw), [given.source] * len(passed.proposals)
 
 
 def _at_contact(

@@ -13,8 +13,8 @@ from manitwin.pipeline.guesses import OF_NO_NAME, naming_checks, shape_checks, s
 from manitwin.pipeline.photo_thinning import thinned_words
 from manitwin.pipeline.suspicious_size import usual_size_checks
 from manitwin.twin.import_record import read_import_record
+from manitwin.twin.proportions import wilson_interval
 from manitwin.twin.record_values import Check
-from manitwin.twin.shares import wilson_interval
 
 UNCOVERED_LIMIT_M = 0.002
 """Largest distance of the surface from the hulls; beyond it fingers would sink in (docs/measured/meshes.md)."""
@@ -117,13 +117,13 @@ def photos_checks(draft: Draft) -> list[Check]:
     passed = not said
     before = draft.payload.photos_given
     said += [] if before is None else [thinned_words(given, before)]
-    said += _turns_told(generation["notes"])
+    said += _describe_camera_turns(generation["notes"])
     return [
         Check(name="every_photo_used", passed=passed, value=float(used), limit=float(given), message="; ".join(said))
     ]
 
 
-def _turns_told(notes: dict[str, Any]) -> list[str]:
+def _describe_camera_turns(notes: dict[str, Any]) -> list[str]:
     """Describe the estimated camera turns with their confidence, stated poses, and the camera position found from outlines."""
     said, estimated = [], [view for view in notes.get("views", []) if not view["turn_stated"]]
     if estimated:

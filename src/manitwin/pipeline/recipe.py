@@ -14,7 +14,7 @@ from manitwin.engine.recipe import Ending, Identity, Tables
 from manitwin.engine.stage import INPUT, Draft, PaidStage, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import InputChanged, Rejected, UsageError
-from manitwin.models.annotators.given import KeepsGiven
+from manitwin.models.annotators.imported_annotations import ImportedAnnotator
 from manitwin.models.annotators.protocol import Annotator
 from manitwin.models.matting.learned import Network, find_networks, require_working
 from manitwin.models.registry import create, target, without_url
@@ -48,9 +48,9 @@ from manitwin.pipeline.verify import VerifyStage
 from manitwin.pipeline.views import ViewsStage
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
+from manitwin.twin.integrity import find_size_damage
 from manitwin.twin.record import StageProvenance, TwinRecord
 from manitwin.twin.store import RECORD, parse_record, sha256_of_json
-from manitwin.twin.wholeness import size_damage
 
 RUN = logging.getLogger("manitwin.run")
 _STAGES_NAMED = 4
@@ -99,7 +99,7 @@ def _check_agreement(grippers: list[Gripper], config: BuildConfig) -> None:
 def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
     """Return the pipeline's stages for a kind of input, in order."""
     own = create("annotator", config.annotator, config)
-    annotator = KeepsGiven(own)
+    annotator = ImportedAnnotator(own)
     grippers = _grippers(config)
     first = grippers[0][0]
     return [
@@ -198,7 +198,7 @@ def is_current(record: TwinRecord, config: BuildConfig) -> bool:
     return not _otherwise_set(record, config) and not _other_stages(record, config)
 
 
-def made_otherwise(record: TwinRecord, config: BuildConfig) -> str:
+def describe_differences(record: TwinRecord, config: BuildConfig) -> str:
     """Describe how configuration, seed and stages differ from those that made a twin; empty if they do not."""
     said = _otherwise_set(record, config)
     if stages := _other_stages(record, config):
@@ -257,7 +257,7 @@ class TwinRecipe(FolderRecipe[TwinRecord]):
 
     def damage(self, root: DatasetRoot, item_id: str) -> str | None:
         """Return what is wrong with a twin's folder, judged by file sizes; None if nothing is."""
-        return size_damage(root, twin_name(item_id))
+        return find_size_damage(root, twin_name(item_id))
 
     def identify(self, payload: Item) -> Identity:
         """Return the id and kind of an input from the content of its files.
@@ -325,7 +325,7 @@ def ending_of(record: TwinRecord) -> Ending:
         detail = record.rejection.detail
     else:
         detail = f"{record.grasps.verified} of {record.grasps.simulated} grasps verified" if record.grasps else ""
-    if (meant := _taken_as(record)) is not None:
+    if (meant := _template_category(record)) is not None:
         detail += f"; taken as a {meant}"
     if record.provenance.rehearsed:
         detail += "; a rehearsal"
@@ -333,7 +333,7 @@ def ending_of(record: TwinRecord) -> Ending:
     return Ending(record.status, record.revision, reason, detail, "; ".join(hints) or None)
 
 
-def _taken_as(record: TwinRecord) -> str | None:
+def _template_category(record: TwinRecord) -> str | None:
     """Return the category that a template assigned to a text, if the text does not contain it: a king as a chess king."""
     model = record.provenance.stages["generate"].model if "generate" in record.provenance.stages else None
     if record.source.kind != "text" or model is None or not model.startswith(OF_TEMPLATE):

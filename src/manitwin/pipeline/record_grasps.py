@@ -16,7 +16,7 @@ from manitwin.pipeline.grasp_regions import NOBODY, READS, PartedSolid, region_c
 from manitwin.pipeline.grasps import GRASP_POINTS, PROPOSED, UNFILTERED
 from manitwin.pipeline.robustness import ROBUSTNESS, ROBUSTNESS_FILE, rank_values
 from manitwin.pipeline.second_opinion import AGREEMENT, FAILS, NOT_TRIED, SECOND_OPINION
-from manitwin.pipeline.tried import read_arrays, read_tried, tried_names
+from manitwin.pipeline.tried_grasps import read_arrays, read_tried, tried_names
 from manitwin.pipeline.verify import TRIAL
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.grasp_summary import FailureTable, GraspSummary, OtherGripper

@@ -11,9 +11,9 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 
 from manitwin.geometry.distance import closest_points_on_triangles
-from manitwin.geometry.frames.closer import REACH_SHARE, around
 from manitwin.geometry.frames.feature import FramedMesh
-from manitwin.geometry.frames.words import is_end, means_place
+from manitwin.geometry.frames.label_keywords import denotes_feature_itself, is_end_face_label
+from manitwin.geometry.frames.nearby_samples import REACH_SHARE, find_nearby_samples
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.geometry.sampling import farthest_point_sampling
 from manitwin.twin.point_records import FunctionalFrame, FunctionalPoint, RefinedCandidate
@@ -58,16 +58,16 @@ def _closer(
     point: FunctionalPoint, frame: FunctionalFrame, surface: FramedMesh
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the position and normal closest to a feature; None if the improvement is negligible."""
-    if not means_place(point.label, frame.kind):
+    if not denotes_feature_itself(point.label, frame.kind):
         return None
     positions, normals = surface.samples
     at, out = np.array(point.position_m), np.array(point.normal)
     if frame.kind in ("face", "button"):
         z = rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz))[:, 2]
         level = abs(float((at - frame.position_m) @ z)) < max(_LEAST_LEVEL_M, _LEVEL_SHARE * surface.size_m)
-        if z @ out < _BESIDE or not (level or is_end(point.label)):
+        if z @ out < _BESIDE or not (level or is_end_face_label(point.label)):
             return None
-    near = around(surface, at, out)
+    near = find_nearby_samples(surface, at, out)
     if not len(near):
         return None
     closer = near[farthest_point_sampling(positions[near], CLOSER - 1, 0)]

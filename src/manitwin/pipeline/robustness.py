@@ -12,16 +12,16 @@ from manitwin.config import Resource, RobustnessConfig, VerifyConfig
 from manitwin.engine.stage import Draft
 from manitwin.physics.robustness import (
     FillCurve,
+    PerturbationRanges,
     Robustness,
     SequentialTest,
-    Spread,
     draw_perturbations,
-    try_until_clear,
+    run_sequential_test,
 )
 from manitwin.physics.trial import GraspTrial
 from manitwin.pipeline.grasps import UNFILTERED
 from manitwin.pipeline.object_state import joints_of, load_body
-from manitwin.pipeline.tried import read_tried, tried_names
+from manitwin.pipeline.tried_grasps import read_tried, tried_names
 from manitwin.pipeline.verify import trial_settings
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.grasp_summary import RobustnessSummary
@@ -76,14 +76,14 @@ class RobustnessStage:
         )
         held, trials = np.zeros(len(poses), np.int32), np.zeros(len(poses), np.int32)
         for index in good:
-            answer = try_until_clear(lambda number, index=index: survives(index, number), test)  # type: ignore[misc]
+            answer = run_sequential_test(lambda number, index=index: survives(index, number), test)  # type: ignore[misc]
             held[index], trials[index] = answer.held, answer.trials
         np.savez(folder / self.file, held=held, trials=trials)
         return {self.field: self._summary(spread, test, held[good], trials[good]).model_dump(mode="json")}
 
-    def _spread(self, physical: dict[str, Any], filling: FillCurve | None) -> Spread:
+    def _spread(self, physical: dict[str, Any], filling: FillCurve | None) -> PerturbationRanges:
         settings, mass = self.settings, physical["mass_kg"]
-        return Spread(
+        return PerturbationRanges(
             pose_m=settings.pose_m,
             pose_deg=settings.pose_deg,
             friction=settings.friction,
@@ -94,7 +94,9 @@ class RobustnessStage:
             else float(filling.uncertainties_m.max()),
         )
 
-    def _summary(self, spread: Spread, test: SequentialTest, held: np.ndarray, trials: np.ndarray) -> RobustnessSummary:
+    def _summary(
+        self, spread: PerturbationRanges, test: SequentialTest, held: np.ndarray, trials: np.ndarray
+    ) -> RobustnessSummary:
         share = held / np.maximum(trials, 1)
         return RobustnessSummary(
             **vars(spread),

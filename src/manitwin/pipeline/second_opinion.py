@@ -14,7 +14,7 @@ from manitwin.physics.robustness import jittered
 from manitwin.physics.trial import GraspTrial, TrialResult
 from manitwin.pipeline.grasps import UNFILTERED
 from manitwin.pipeline.object_state import joints_of, load_body
-from manitwin.pipeline.tried import read_tried, tried_names
+from manitwin.pipeline.tried_grasps import read_tried, tried_names
 from manitwin.pipeline.verify import trial_settings
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.grasp_summary import SecondOpinion as SecondOpinionRecord

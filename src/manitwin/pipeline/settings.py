@@ -9,7 +9,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, Literal, TypedDict
 
-from manitwin.config import MOST_SLOTS, BuildConfig, load_config, validated
+from manitwin.config import MOST_SLOTS, BuildConfig, load_config, validate_settings
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.errors import ConfigError, UsageError
 from manitwin.formats.printable import printable_line
@@ -90,7 +90,7 @@ def with_flags(settings: BuildConfig, flags: Flags) -> BuildConfig:
         update["second_opinion"] = settings.second_opinion.model_copy(update={"enabled": False})
         update["robustness"] = settings.robustness.model_copy(update={"enabled": False})
         update["verify"] = settings.verify.model_copy(update={"doubts_tried_again": False})
-    return validated(BuildConfig, settings.model_copy(update=update).model_dump(), "the arguments")
+    return validate_settings(BuildConfig, settings.model_copy(update=update).model_dump(), "the arguments")
 
 
 def _given(said: dict[str, Any]) -> dict[str, Any]:
@@ -111,7 +111,9 @@ def stored_config(root: DatasetRoot) -> BuildConfig:
         kind = printable_line(str(said["kind"])[:40])
         raise NotTwins(f"{root.url}: contains {kind}, not twins; give the data set of their twins")
     try:
-        return validated(BuildConfig, {name: value for name, value in said.items() if name not in RETIRED}, place)
+        return validate_settings(
+            BuildConfig, {name: value for name, value in said.items() if name not in RETIRED}, place
+        )
     except ConfigError as error:
         raise UsageError(f"{place}: not a configuration of this version ({error}); give --config") from error
 
@@ -120,7 +122,7 @@ _DECIDE_NO_TWIN = ("run", "services")
 _MOST_NAMED, _MOST_SHOWN = 6, 80
 
 
-def _not_by_default(settings: BuildConfig) -> str:
+def _non_default_settings(settings: BuildConfig) -> str:
     """List the settings that affect twins and differ from this version's defaults, in one line.
 
     They were chosen earlier, or were the defaults of the version that made the data set.
@@ -189,13 +191,13 @@ def request_build(
     if jobs is not None:
         settings = settings.model_copy(update={"run": settings.run.model_copy(update={"cpu": jobs})})
     # imported here, as it takes two CPU-seconds: invalid arguments are rejected first
-    from manitwin.pipeline.generator_input import refusal
+    from manitwin.pipeline.generator_input import make_input_check
     from manitwin.pipeline.recipe import check_names
 
     check_names(settings)
     notes = Notes()
     if config is None and base != BuildConfig():
-        kept = _not_by_default(base)
+        kept = _non_default_settings(base)
         which = f" (not this version's defaults: {kept})" if kept else ""
         notes.remarks.append(
             f"the settings are those that the data set was built with{which}; --config and options change them"
@@ -210,6 +212,6 @@ def request_build(
         views=views,
         turns_deg=turns_deg,
         poses=poses,
-        refusal=refusal(settings),
+        refusal=make_input_check(settings),
     )
     return BuildRequest(str(out), settings, root, items, notes)

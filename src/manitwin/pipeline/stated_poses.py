@@ -11,11 +11,17 @@ import numpy as np
 from manitwin.errors import InputError
 from manitwin.formats.camera_poses.posed_camera import PosedCamera
 from manitwin.formats.camera_poses.read import CameraPoses
-from manitwin.geometry.camera_up import MOST_ROLL_DEG, UpTold, azimuth_deg, up_as_stated, up_of_cameras
+from manitwin.geometry.camera_up import (
+    MOST_ROLL_DEG,
+    UpDirection,
+    azimuth_deg,
+    up_from_level_cameras,
+    up_from_world_axis,
+)
 from manitwin.geometry.length_unit import UNITS_M
 from manitwin.geometry.poses import rotation_between
 from manitwin.pipeline.item import Item, masks_of
-from manitwin.pipeline.photo_cameras import called, cameras_of_photos, read_poses
+from manitwin.pipeline.photo_cameras import cameras_of_photos, pose_file_label, read_poses
 
 USUAL_UP = {"transforms.json": "z", "colmap": None}
 """The usual up axis of each format's files; a COLMAP model has an arbitrary orientation."""
@@ -31,7 +37,7 @@ class StatedPoses:
     file: str
     format: str
     cameras: tuple[PosedCamera, ...]
-    up: UpTold
+    up: UpDirection
     unit_m: float | None
     unit_said: str
 
@@ -74,8 +80,10 @@ def stated_poses(photos: Sequence[Path], poses: Path, up: str = "auto", units: s
     found = read_poses(poses)
     cameras = cameras_of_photos(photos, found)
     rotations = np.array([camera.world_to_camera[:, :3] for camera in cameras])
-    told = up_of_cameras(rotations, USUAL_UP[found.format]) if up == "auto" else up_as_stated(rotations, up)
-    file = called(found)
+    told = (
+        up_from_level_cameras(rotations, USUAL_UP[found.format]) if up == "auto" else up_from_world_axis(rotations, up)
+    )
+    file = pose_file_label(found)
     if told is None and up != "auto":
         raise InputError(
             "unreadable",
@@ -107,5 +115,5 @@ def _unit(found: CameraPoses, units: str) -> tuple[float | None, str]:
         return UNITS_M[units], f"{units}, as was stated"
     if found.unit_m is not None and units == "auto":
         name = next(name for name, unit_m in UNITS_M.items() if unit_m == found.unit_m)
-        return found.unit_m, f"{name}, as {called(found)} states"
+        return found.unit_m, f"{name}, as {pose_file_label(found)} states"
     return None, "not stated"

@@ -9,7 +9,7 @@ from manitwin.errors import UsageError
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.generators.templates.capacity import CLOSED_WALLS_M
 from manitwin.models.generators.templates.stated_amounts import amounts_in
-from manitwin.models.generators.templates.stated_lengths import in_figures
+from manitwin.models.generators.templates.stated_lengths import normalise_lengths
 
 HEADSPACE = 1.05
 """Capacity to the brim relative to the sold volume: wine bottles 1.03, cartons 1.05, cans 1.07."""
@@ -20,7 +20,7 @@ def stated_volume_m3(name: str | None, prior: Prior | None) -> float | None:
     if name is None or prior is None or not prior.vessel:
         return None
     try:
-        said = amounts_in(in_figures(name), prior)
+        said = amounts_in(normalise_lengths(name), prior)
     except UsageError:  # a range of volumes, which a name may contain, counts as not stated
         return None
     volumes = {amount.volume_m3 for amount in said if amount.volume_m3 is not None}

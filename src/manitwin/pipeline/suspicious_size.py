@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from manitwin.engine.stage import Draft
-from manitwin.models.annotators.prior_names import found_by, word_for
+from manitwin.models.annotators.prior_names import found_by, object_noun
 from manitwin.models.annotators.priors import unknown_prior
 from manitwin.pipeline.object_state import object_name
 from manitwin.pipeline.size_remarks import CHECK_SCALE
@@ -39,7 +39,7 @@ def suspicious_size_words(draft: Draft[Any]) -> str | None:
     usual = (prior or unknown_prior()).longest_axis_m
     if usual.low / _BEYOND <= longest_m <= _BEYOND * usual.high:
         return None
-    such = "things of a hand's size have" if found is None else f"nearly every {word_for(*found)} has"
+    such = "things of a hand's size have" if found is None else f"nearly every {object_noun(*found)} has"
     mixed = next(
         (f" ({said}?)" for factor, said in FACTORS.items() if usual.low <= factor * longest_m <= usual.high), ""
     )

@@ -21,7 +21,7 @@ def natural_order(name: str) -> tuple[list[tuple[int, int | str]], str]:
     return [(0, int(part)) if part.isascii() and part.isdigit() else (1, part) for part in parts if part], name
 
 
-def in_order(files: Sequence[Path], poses: Path | None) -> tuple[list[Path], list[Path]]:
+def order_photos(files: Sequence[Path], poses: Path | None) -> tuple[list[Path], list[Path]]:
     """Return the files of a folder in natural order, and those left out because ``poses`` has no pose for them.
 
     Pose estimation programs may fail to register some photos. If no photo has a pose, none is left out. Raises UsageError for
@@ -38,7 +38,7 @@ def in_order(files: Sequence[Path], poses: Path | None) -> tuple[list[Path], lis
     return (kept, without) if kept else (found, [])
 
 
-def no_pose_told(without: Sequence[Path], poses: str | Path | None) -> list[str]:
+def missing_pose_messages(without: Sequence[Path], poses: str | Path | None) -> list[str]:
     """Describe the photos of a folder that have no pose; empty if all have one."""
     if not without or poses is None:
         return []
@@ -56,5 +56,5 @@ def listed_views(paths: Sequence[Path], poses: Path | None) -> list[Path]:
         inputs = list_folder(path).inputs
         if not inputs:
             raise UsageError(f"{path}: this folder contains no photo; give photos, or a folder of them")
-        found += in_order(inputs, poses)[0]
+        found += order_photos(inputs, poses)[0]
     return found

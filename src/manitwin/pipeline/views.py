@@ -13,9 +13,9 @@ from PIL import Image, WebPImagePlugin
 from manitwin.config import Resource, ViewsConfig
 from manitwin.engine.stage import Draft
 from manitwin.pipeline.object_state import load_visual
+from manitwin.render.background_colors import background_for
 from manitwin.render.cameras import Camera, orbit_cameras
-from manitwin.render.grounds import ground_for
-from manitwin.render.raycast import merged
+from manitwin.render.raycast import merge_parts
 from manitwin.render.renderer import BACKDROP, shared_renderer
 from manitwin.render.visibility import is_closed_and_outward
 
@@ -63,9 +63,9 @@ def draw_views(
     cameras = orbit_cameras(
         points, fov_y_deg=settings.fov_y_deg, size_px=size_px, elevations_deg=settings.elevations_deg
     )
-    frames = shared_renderer().render(parts, cameras, with_backs=not is_closed_and_outward(merged(list(parts))))
-    ground = ground_for(frames)
-    return cameras, [frame.over(BACKDROP, ground) for frame in frames]
+    frames = shared_renderer().render(parts, cameras, with_backs=not is_closed_and_outward(merge_parts(list(parts))))
+    ground = background_for(frames)
+    return cameras, [frame.composited_over(BACKDROP, ground) for frame in frames]
 
 
 def write_webp(picture: np.ndarray, path: Path, quality: int) -> None:

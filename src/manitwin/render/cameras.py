@@ -181,7 +181,7 @@ def hero_camera(
     counts as well, which favours the image's diagonal. ``from_front``: only views from -Y, the side that a photo shows of a
     standing object, and from which a lying object is the right way up.
     """
-    flat = not stands(points)
+    flat = not is_tall(points)
     elevation = HERO_FLAT_ELEVATION_DEG if flat else HERO_ELEVATION_DEG
     best: tuple[float, Camera] | None = None
     for azimuth in HERO_FRONT_AZIMUTHS_DEG if from_front else HERO_AZIMUTHS_DEG:
@@ -202,7 +202,7 @@ def hero_camera(
     return best[1]
 
 
-def stands(points: np.ndarray) -> bool:
+def is_tall(points: np.ndarray) -> bool:
     """Return whether an object with points ``(N, 3)`` in the object frame is too high to be seen from above."""
     extents = np.ptp(points, axis=0)
     return bool(extents[2] >= FLAT * extents[:2].max())

@@ -16,7 +16,7 @@ import trimesh
 from PIL import Image, ImageDraw
 
 from manitwin.geometry.hulls.reduction import convex_corners
-from manitwin.render.cameras import hero_camera, stands
+from manitwin.render.cameras import hero_camera, is_tall
 from manitwin.render.card_panels import (
     DRAWN_GRASPS,
     FUNCTIONAL,
@@ -30,9 +30,9 @@ from manitwin.render.card_panels import (
     mesh_panel,
     render_panel,
 )
-from manitwin.render.center_of_mass import MassCenter
+from manitwin.render.center_of_mass import CenterOfMass
 from manitwin.render.markers import font_of
-from manitwin.render.raycast import merged
+from manitwin.render.raycast import merge_parts
 from manitwin.render.renderer import BACKDROP
 
 WIDTH, HEIGHT = 1600, 540
@@ -66,7 +66,7 @@ def make_card(
     points: Sequence[CardPoint],
     grasps: Sequence[CardGrasp],
     text: CardText,
-    mass: MassCenter | None = None,
+    mass: CenterOfMass | None = None,
     photo: np.ndarray | None = None,
     prompt: str | None = None,
 ) -> bytes:
@@ -77,9 +77,9 @@ def make_card(
     from its front. The first column shows ``photo (H, W, 3 or 4) uint8``, whose side the next two columns show as well, or
     ``prompt``; for a mesh input it shows the untextured shape. Raises RendererMissing if no renderer is available.
     """
-    mesh = merged(list(parts))
+    mesh = merge_parts(list(parts))
     outline = convex_corners(np.asarray(mesh.vertices))[0]  # sufficient for choosing the camera
-    from_front = photo is not None or (prompt is not None and stands(outline))
+    from_front = photo is not None or (prompt is not None and is_tall(outline))
     hero = hero_camera(outline, fov_y_deg=FOV_Y_DEG, width_px=PANEL, height_px=PANEL, from_front=from_front)
     if photo is not None:
         first, caption = input_panel(photo, PANEL), "input photo, cut out"

@@ -11,14 +11,14 @@ import trimesh
 
 from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.hulls.reduction import convex_corners, hull_mesh
-from manitwin.geometry.kept import kept
+from manitwin.geometry.mesh_cache import cached_on_mesh
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling
 from manitwin.render.cameras import Camera, framing_camera, project, silhouette_area_px
-from manitwin.render.center_of_mass import MassCenter, draw_mass_center
+from manitwin.render.center_of_mass import CenterOfMass, draw_center_of_mass
 from manitwin.render.markers import draw_frames, draw_markers
 from manitwin.render.overlays import ground_shadow, visible_edges
-from manitwin.render.raycast import cast_camera, merged, visible_points
+from manitwin.render.raycast import cast_camera, merge_parts, visible_points
 from manitwin.render.renderer import BACKDROP, shared_renderer
 from manitwin.render.surfaces import plain_part
 from manitwin.render.visibility import is_closed_and_outward
@@ -69,20 +69,20 @@ class CardGrasp:
 
 def render_panel(parts: Sequence[trimesh.Trimesh], mesh: trimesh.Trimesh, hero: Camera) -> np.ndarray:
     """Draw the textured object on the ground."""
-    return _grounded(list(parts), mesh, hero)
+    return _render_on_ground(list(parts), mesh, hero)
 
 
 def clay_panel(mesh: trimesh.Trimesh, hero: Camera) -> np.ndarray:
     """Draw the untextured shape, seen from the opposite side."""
-    return _grounded([plain_part(mesh, CLAY)], mesh, _turned(hero, np.asarray(mesh.vertices), 180.0))
+    return _render_on_ground([plain_part(mesh, CLAY)], mesh, _turned(hero, np.asarray(mesh.vertices), 180.0))
 
 
 def mesh_panel(
-    solid: trimesh.Trimesh, hulls: Sequence[np.ndarray], hero: Camera, mass: MassCenter | None = None
+    solid: trimesh.Trimesh, hulls: Sequence[np.ndarray], hero: Camera, mass: CenterOfMass | None = None
 ) -> np.ndarray:
     """Draw the convex hulls in different colours, overlaid with the solid mesh's visible edges and the centre of mass."""
     camera = _turned(hero, np.concatenate([np.asarray(solid.vertices), *hulls]), 0.0)
-    parts = _colored([hull_mesh(hull) for hull in hulls], HULL_COLORS, roughness=0.9)
+    parts = _merge_by_color([hull_mesh(hull) for hull in hulls], HULL_COLORS, roughness=0.9)
     picture = shared_renderer().render(parts, [camera], with_backs=False)[0].rgb.astype(np.float32)
     depth, _, _ = cast_camera(RayCaster(solid), camera)
     cover = visible_edges(solid, camera, depth)
@@ -90,7 +90,7 @@ def mesh_panel(
     strength = min(2.2, 0.25 * max(1, int((depth > 0).sum())) / max(1e-6, float(cover.sum())))
     alpha = np.minimum(cover * strength, 0.85)[..., None]
     drawn = np.rint(picture * (1 - alpha) + WIRE * alpha).astype(np.uint8)
-    return drawn if mass is None else draw_mass_center(drawn, mass, camera)
+    return drawn if mass is None else draw_center_of_mass(drawn, mass, camera)
 
 
 def grasp_panel(
@@ -102,13 +102,14 @@ def grasp_panel(
 ) -> np.ndarray:
     """Draw the object with its points and up to twelve diverse verified grasps."""
     drawn = [
-        grasps[i] for i in diverse(np.array([g.gripper_to_object for g in grasps]).reshape(-1, 4, 4), DRAWN_GRASPS)
+        grasps[i]
+        for i in select_diverse_grasps(np.array([g.gripper_to_object for g in grasps]).reshape(-1, 4, 4), DRAWN_GRASPS)
     ]
     rod_m = 0.012 * float(np.linalg.norm(mesh.extents)) + 0.001
     forks = [gripper_fork(grasp.boxes, rod_m).apply_transform(grasp.gripper_to_object) for grasp in drawn]
     everything = np.concatenate([mesh.vertices, *(fork.vertices for fork in forks)])
-    camera, seen = _telling_camera(mesh, everything, points, hero)
-    picture = _grounded([*parts, *_colored(forks, GRASP_COLORS, roughness=0.5)], mesh, camera)
+    camera, seen = _most_informative_camera(mesh, everything, points, hero)
+    picture = _render_on_ground([*parts, *_merge_by_color(forks, GRASP_COLORS, roughness=0.5)], mesh, camera)
     shown = [point for point, visible in zip(points, seen, strict=True) if visible]
     pixels, _ = project(np.array([point.position_m for point in shown]).reshape(-1, 3), camera)
     colors = [FUNCTIONAL if point.functional else GRASP for point in shown]
@@ -122,7 +123,7 @@ def grasp_panel(
 def input_panel(picture: np.ndarray, size_px: int) -> np.ndarray:
     """Fit a photo ``(H, W, 3 or 4) uint8`` into the panel over the backdrop: the whole photo, or its cut-out with a margin."""
     if picture.shape[2] == 4 and (picture[..., 3] > 127).any():
-        picture = picture[_around(picture[..., 3] > 127)]
+        picture = picture[_padded_bounds(picture[..., 3] > 127)]
     scale = size_px / max(picture.shape[:2])
     width, height = (max(1, round(side * scale)) for side in picture.shape[1::-1])
     fitted = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC)
@@ -136,7 +137,7 @@ def input_panel(picture: np.ndarray, size_px: int) -> np.ndarray:
     return panel
 
 
-def _around(seen: np.ndarray) -> tuple[slice, slice]:
+def _padded_bounds(seen: np.ndarray) -> tuple[slice, slice]:
     """Return the rows and columns of a mask ``(H, W) bool``, with a margin within the image."""
     spans = [np.flatnonzero(seen.any(axis=axis)) for axis in (1, 0)]
     margin = round(INPUT_MARGIN * max(int(span[-1] - span[0] + 1) for span in spans))
@@ -144,7 +145,7 @@ def _around(seen: np.ndarray) -> tuple[slice, slice]:
     return rows, columns
 
 
-def diverse(gripper_to_object: np.ndarray, count: int) -> np.ndarray:
+def select_diverse_grasps(gripper_to_object: np.ndarray, count: int) -> np.ndarray:
     """Return the indices of up to ``count`` grasps ``(N, 4, 4)``, diverse in position and approach direction."""
     if not len(gripper_to_object):
         return np.zeros(0, dtype=int)
@@ -153,12 +154,14 @@ def diverse(gripper_to_object: np.ndarray, count: int) -> np.ndarray:
     return farthest_point_sampling(np.hstack([tips, 0.35 * spread * gripper_to_object[:, :3, 2]]), count)
 
 
-def _colored(
+def _merge_by_color(
     shapes: Sequence[trimesh.Trimesh], colors: Sequence[tuple[int, int, int]], *, roughness: float
 ) -> list[trimesh.Trimesh]:
     """Return one part per colour; the shapes are assigned to the colours in turn."""
     turns = [list(shapes[index :: len(colors)]) for index in range(min(len(colors), len(shapes)))]
-    return [plain_part(merged(turn), color, roughness=roughness) for turn, color in zip(turns, colors, strict=False)]
+    return [
+        plain_part(merge_parts(turn), color, roughness=roughness) for turn, color in zip(turns, colors, strict=False)
+    ]
 
 
 def _turned(hero: Camera, points: np.ndarray, turn_deg: float) -> Camera:
@@ -174,7 +177,7 @@ def _turned(hero: Camera, points: np.ndarray, turn_deg: float) -> Camera:
     )
 
 
-def _telling_camera(
+def _most_informative_camera(
     mesh: trimesh.Trimesh, everything: np.ndarray, points: Sequence[CardPoint], hero: Camera
 ) -> tuple[Camera, np.ndarray]:
     """Return the camera, among twelve around the object, that shows the most points at a large scale, and which points it
@@ -198,9 +201,9 @@ def _telling_camera(
     return best[1], best[2]
 
 
-def _grounded(parts: list[trimesh.Trimesh], mesh: trimesh.Trimesh, camera: Camera) -> np.ndarray:
+def _render_on_ground(parts: list[trimesh.Trimesh], mesh: trimesh.Trimesh, camera: Camera) -> np.ndarray:
     """Draw ``parts`` (those of ``mesh``, and further closed ones) over the shadow of ``mesh`` on the ground."""
-    closed = kept(mesh, "closed and outward", lambda: is_closed_and_outward(mesh))
+    closed = cached_on_mesh(mesh, "closed and outward", lambda: is_closed_and_outward(mesh))
     frame = shared_renderer().render(parts, [camera], with_backs=not closed)[0]
     shade = ground_shadow(mesh, camera)
     behind, picture = ((1 - frame.coverage) * (1 - shade)).astype(float), np.empty_like(frame.rgb)
@@ -235,12 +238,12 @@ def gripper_fork(boxes: Boxes, rod_m: float) -> trimesh.Trimesh:
     reach = max(abs(float(rod.vertices[:, 0].mean())) for rod in rods)
     rods.append(_rod([-reach, 0, front], [reach, 0, front], rod_m))
     rods.append(_rod([0, 0, front - STEM_SHARE * (max(tips) - front)], [0, 0, front], rod_m))
-    return merged(rods)
+    return merge_parts(rods)
 
 
 def gripper_body(boxes: Boxes) -> trimesh.Trimesh:
     """Return the gripper's boxes as one mesh in the grasp frame."""
-    return merged([trimesh.creation.box(2 * half, box_to_gripper) for box_to_gripper, half in boxes])
+    return merge_parts([trimesh.creation.box(2 * half, box_to_gripper) for box_to_gripper, half in boxes])
 
 
 def _rod(start: Sequence[float], end: Sequence[float], thickness: float) -> trimesh.Trimesh:

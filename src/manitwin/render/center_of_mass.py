@@ -15,14 +15,14 @@ _SUBPIXEL_BITS = 4
 
 
 @dataclass(frozen=True)
-class MassCenter:
+class CenterOfMass:
     """The centre of mass: ``position_m (3,)`` in the object frame, and its uncertainty (m)."""
 
     position_m: np.ndarray
     uncertainty_m: float
 
 
-def draw_mass_center(picture: np.ndarray, center: MassCenter, camera: Camera) -> np.ndarray:
+def draw_center_of_mass(picture: np.ndarray, center: CenterOfMass, camera: Camera) -> np.ndarray:
     """Return an image ``(H, W, 3) uint8`` with the centre of mass drawn in front of everything.
 
     The ring around the disc has the radius of the uncertainty; it is omitted if it would lie within the disc.

@@ -23,7 +23,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from manitwin.errors import ManiTwinError, RendererMissing, UsageError
-from manitwin.formats.installation import left_out
+from manitwin.formats.installation import block_import
 
 RUN = logging.getLogger("manitwin.run")
 SWITCH = "MANITWIN_RENDER_DEVICE"
@@ -74,7 +74,7 @@ class RenderDevice:
     driver_file: str | None
 
     @property
-    def on_cpu(self) -> bool:
+    def is_software(self) -> bool:
         """Return whether this is a software renderer rather than a GPU."""
         return "llvmpipe" in self.name or "SwiftShader" in self.name
 
@@ -82,7 +82,7 @@ class RenderDevice:
 def render_scene(picture_formats: Mapping[str, str]) -> tuple[Any, Any]:
     """Return the SAPIEN module and an empty scene for rendering, with these image formats. Raises RendererMissing."""
     require_renderer()
-    with warnings.catch_warnings(), left_out("pinocchio"):  # 45 MB; SAPIEN has its own copy, which is not used here
+    with warnings.catch_warnings(), block_import("pinocchio"):  # 45 MB; SAPIEN has its own copy, which is not used here
         warnings.simplefilter("ignore")  # SAPIEN warns about optional drivers
         import sapien
         import sapien.render
@@ -97,11 +97,11 @@ def require_renderer() -> RenderDevice:
 
     Raises RendererMissing if no device renders, and UsageError if MANITWIN_RENDER_DEVICE is neither auto nor cpu.
     """
-    question = {"switch": _switch(), **{name: os.environ.get(name) for name in LOADER_VARIABLES}}
+    question = {"switch": _device_setting(), **{name: os.environ.get(name) for name in LOADER_VARIABLES}}
     known = json.loads(os.environ.get(FOUND, "null"))
     if known is not None and known["question"] == question:
         return RenderDevice(**known["device"])
-    device = _found_together(question)
+    device = _find_shared_device(question)
     if device.driver_file is not None:
         for name in LOADER_VARIABLES:
             os.environ[name] = device.driver_file
@@ -112,13 +112,13 @@ def require_renderer() -> RenderDevice:
 
 def require_driver() -> None:
     """Raise RendererMissing if no driver is installed; an installed driver is not tried, which would take a process."""
-    named, ways = _ways(_switch() == "cpu")
+    named, ways = _driver_candidates(_device_setting() == "cpu")
     if not ways or (named is not None and not any(map(os.path.exists, named.split(os.pathsep)))):
         require_renderer()
 
 
 @contextmanager
-def looked_for_once() -> Iterator[None]:
+def share_device_search() -> Iterator[None]:
     """Make this process and those started within the ``with`` statement search for the device only once.
 
     The first process that needs it searches, and others wait for the result.
@@ -131,11 +131,11 @@ def looked_for_once() -> Iterator[None]:
             del os.environ[FOUND_AT]
 
 
-def _found_together(question: dict[str, str | None]) -> RenderDevice:
+def _find_shared_device(question: dict[str, str | None]) -> RenderDevice:
     """Return the device that another process of this run found for the same question, or search and share the result."""
     place = os.environ.get(FOUND_AT)
     if place is None:
-        return _looked_for(question)
+        return _find_device(question)
     with open(place, "a+", encoding="utf-8") as file:
         fcntl.flock(file, fcntl.LOCK_EX)  # released when the file is closed or the process ends
         file.seek(0)
@@ -143,13 +143,13 @@ def _found_together(question: dict[str, str | None]) -> RenderDevice:
         known = json.loads(said) if said.endswith("}") else None  # incomplete if a process was killed while writing
         if known is not None and known["question"] == question:
             return RenderDevice(**known["device"])
-        device = _looked_for(question)
+        device = _find_device(question)
         file.truncate(0)
         file.write(json.dumps({"question": question, "device": asdict(device)}))
         return device
 
 
-def _looked_for(question: dict[str, str | None]) -> RenderDevice:
+def _find_device(question: dict[str, str | None]) -> RenderDevice:
     device = _first_working(question["switch"] == "cpu")
     why = f"{SWITCH}=cpu" if question["switch"] == "cpu" else "the first that renders, GPUs before the CPU"
     RUN.info("renderer: %s, driver %s (%s)", device.name, device.driver_file or "chosen by the loader", why)
@@ -159,18 +159,18 @@ def _looked_for(question: dict[str, str | None]) -> RenderDevice:
 def renderer_summary() -> str:
     """Describe the rendering device in one line. Raises RendererMissing if there is none."""
     device = require_renderer()
-    kind = "on the CPU" if device.on_cpu else "GPU"
+    kind = "on the CPU" if device.is_software else "GPU"
     return f"{device.name}, {kind}, driver {device.driver_file or 'chosen by the loader'}"
 
 
-def _switch() -> str:
+def _device_setting() -> str:
     value = os.environ.get(SWITCH, "auto")
     if value not in ("auto", "cpu"):
         raise UsageError(f"{SWITCH}={value!r} is unknown; valid: auto, cpu")
     return value
 
 
-def _ways(cpu_only: bool) -> tuple[str | None, list[str | None]]:
+def _driver_candidates(cpu_only: bool) -> tuple[str | None, list[str | None]]:
     """Return the driver files named by the user, and the drivers to try in order (None: the loader's choice)."""
     named = next((os.environ[name] for name in LOADER_VARIABLES if os.environ.get(name)), None)
     if cpu_only and named is not None and "lvp" not in named:
@@ -185,7 +185,7 @@ def _ways(cpu_only: bool) -> tuple[str | None, list[str | None]]:
 
 def _first_working(cpu_only: bool) -> RenderDevice:
     """Try the devices in order of preference and return the first that renders."""
-    named, ways = _ways(cpu_only)
+    named, ways = _driver_candidates(cpu_only)
     causes = []
     for driver_file in ways:
         name, cause = _probe(driver_file, picture=driver_file is None and named is None)

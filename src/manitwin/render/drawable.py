@@ -9,15 +9,15 @@ from itertools import product
 import numpy as np
 import trimesh
 
+from manitwin.formats.meshes.shading_normals import with_creased_normals
 from manitwin.formats.meshes.textures import make_part, material_of, uv_of
-from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.poses import rotation_between
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.repair.welding import weld_equal
-from manitwin.render.raycast import merged
+from manitwin.render.raycast import merge_parts
 from manitwin.render.simplification import simplified
 from manitwin.render.surfaces import RenderSurface, front_faces, render_surface, shrunk
-from manitwin.render.visibility import faces_seen_from_outside
+from manitwin.render.visibility import externally_visible_faces
 
 SMALL_TEXTURE_PX = 1024  # for simplified objects; a twin's 2048 take four times the memory and upload time
 SHADOW_TOLERANCE_M = 0.001
@@ -38,7 +38,7 @@ class Drawable:
     shadow: RenderSurface
 
 
-def drawable(
+def prepare_drawable(
     parts: Sequence[trimesh.Trimesh],
     *,
     tolerance_m: float = 0.0,
@@ -59,9 +59,9 @@ def drawable(
         if most_texture_px is None:
             most_texture_px = SMALL_TEXTURE_PX
     surfaces = [render_surface(part) if both_sides else front_faces(render_surface(part)) for part in parts]
-    whole = merged(list(parts))
+    whole = merge_parts(list(parts))
     if hidden_left_out:
-        surfaces = _seen_alone(surfaces, *_sides_seen(whole, both_sides))
+        surfaces = _keep_visible_sides(surfaces, *_sides_seen(whole, both_sides))
     if most_texture_px is not None:
         surfaces = [_with_small_textures(each, most_texture_px) for each in surfaces]
     return Drawable(tuple(surfaces), _shadow_caster(whole, both_sides, tolerance_m, hidden_left_out))
@@ -77,13 +77,13 @@ def _joined_by_material(parts: Sequence[trimesh.Trimesh]) -> list[trimesh.Trimes
             color = np.asarray(material.baseColorFactor).tolist()
             look = (*color, float(material.metallicFactor), float(material.roughnessFactor))
         alike.setdefault(look, []).append(part)
-    return [_joined(each) for each in alike.values()]
+    return [_merge_parts(each) for each in alike.values()]
 
 
-def _joined(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+def _merge_parts(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     if len(parts) == 1:
         return parts[0]
-    whole = merged(parts)
+    whole = merge_parts(parts)
     return make_part(whole.vertices, whole.faces, material=material_of(parts[0]), name=parts[0].metadata["name"])
 
 
@@ -129,10 +129,10 @@ def _with_small_textures(s: RenderSurface, most_px: int) -> RenderSurface:
 
 def _sides_seen(mesh: trimesh.Trimesh, both_sides: bool) -> list[np.ndarray]:
     """Return which faces are visible from their outward side, and with ``both_sides`` which from behind, ``(F,) bool`` each."""
-    return [faces_seen_from_outside(mesh, from_behind=behind) for behind in ([False, True] if both_sides else [False])]
+    return [externally_visible_faces(mesh, from_behind=behind) for behind in ([False, True] if both_sides else [False])]
 
 
-def _seen_alone(
+def _keep_visible_sides(
     surfaces: list[RenderSurface], front: np.ndarray, back: np.ndarray | None = None
 ) -> list[RenderSurface]:
     """Keep the visible sides of faces only: ``(F,) bool`` masks over all surfaces, ``back`` None for one-sided surfaces."""
@@ -192,7 +192,7 @@ def shows_back_faces(parts: Sequence[trimesh.Trimesh]) -> bool:
     Parallel rays are cast from the 26 directions of a cube's faces, edges and corners. Two-sided rendering takes twice the
     time.
     """
-    mesh = merged(list(parts))
+    mesh = merge_parts(list(parts))
     if not len(mesh.faces):
         return False
     caster = RayCaster(mesh)

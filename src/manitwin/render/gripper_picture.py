@@ -8,7 +8,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from manitwin.geometry.poses import rotation_between, transform
 from manitwin.render.cameras import Camera, framing_camera
-from manitwin.render.raycast import merged
+from manitwin.render.raycast import merge_parts
 from manitwin.render.renderer import shared_renderer
 from manitwin.render.surfaces import plain_part
 from manitwin.robots.grippers.gripper import Gripper
@@ -50,12 +50,12 @@ def gripper_picture(gripper: Gripper) -> Image.Image:
                 height_px=TILE_PX,
             )
             left, top = TILE_PX * column, (TILE_PX + LABEL_PX) * line
-            picture.paste(_seen(parts, marks, camera), (left, top + LABEL_PX))
+            picture.paste(_render_with_marks(parts, marks, camera), (left, top + LABEL_PX))
             draw.text((left + 12, top + 10), label, fill=INK, font=font)
     return picture
 
 
-def _seen(parts: list[trimesh.Trimesh], marks: list[trimesh.Trimesh], camera: Camera) -> Image.Image:
+def _render_with_marks(parts: list[trimesh.Trimesh], marks: list[trimesh.Trimesh], camera: Camera) -> Image.Image:
     """Draw parts, with the marks in front of everything."""
     under = shared_renderer().render(parts, [camera], background=WHITE)[0].rgb.astype(float)
     front = shared_renderer().render(marks, [camera], background=WHITE)[0]
@@ -107,7 +107,7 @@ def _hand_parts(hand: MultiFingerGripper, joints_rad: np.ndarray) -> list[trimes
     parts = []
     for link, pose, finger in zip(hand.links, hand.link_poses(joints_rad), hand.finger_of_link, strict=True):
         color = PALM if finger < 0 else THUMB if finger == 0 else FINGER
-        parts += [plain_part(shape.solid().apply_transform(pose), color) for shape in link.shapes]
+        parts += [plain_part(shape.to_mesh().apply_transform(pose), color) for shape in link.shapes]
     return parts
 
 
@@ -123,7 +123,7 @@ def _marks(gripper: Gripper, size_m: float) -> list[trimesh.Trimesh]:
         shaft.apply_translation([0, 0, 0.42 * length_m])
         head = trimesh.creation.cone(0.02 * size_m, 0.2 * length_m, sections=24)
         head.apply_translation([0, 0, 0.8 * length_m])
-        arrow = merged([shaft, head])
+        arrow = merge_parts([shaft, head])
         arrow.apply_transform(transform(rotation_between(np.eye(3)[2], np.eye(3)[axis])))
         marks.append(plain_part(arrow, color))
     ball = trimesh.creation.icosphere(2, 0.014 * size_m)

@@ -20,7 +20,7 @@ _FULL_TURN = np.pi / 2
 """Range drawn to either side for a joint without limits."""
 
 
-def telling_states(twin: Twin) -> list[dict[str, float]]:
+def representative_states(twin: Twin) -> list[dict[str, float]]:
     """Return joint states that show a twin's motion: the reference state, then each joint at the ends of its range."""
     states: list[dict[str, float]] = [{}]
     for joint in joints_of(twin.record):

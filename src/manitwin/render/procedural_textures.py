@@ -16,7 +16,7 @@ import scipy.fft
 import trimesh
 from PIL import Image
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.formats.meshes.textures import make_part, pbr_material
 
 TEXTURE_PX = 1024
@@ -43,7 +43,7 @@ def procedural_texture(material: str, seed: int, *, size_px: int = TEXTURE_PX) -
     Raises UsageError for another material. Equal material, seed and size give equal pixels.
     """
     if material not in _MAKERS:
-        raise UsageError(choose_from("furniture material", material, _MAKERS))
+        raise UsageError(unknown_name_message("furniture material", material, _MAKERS))
     return _MAKERS[material](np.random.default_rng([seed, sorted(_MAKERS).index(material)]), size_px)
 
 

@@ -72,12 +72,12 @@ def visible_points(
     return facing & inside & (np.abs(hit - distance) <= tolerance_m)
 
 
-def seen_tolerance_m(extents_m: np.ndarray) -> float:
+def visibility_tolerance_m(extents_m: np.ndarray) -> float:
     """Return the tolerance (m) for candidates on the visible surface, for an object with extents ``(3,)``."""
     return min(ON_SURFACE_M, ON_SURFACE_SHARE * float(extents_m.max()))
 
 
-def merged(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+def merge_parts(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     """Return the geometry of visual parts as one mesh."""
     vertices, faces = trimesh.util.append_faces([part.vertices for part in parts], [part.faces for part in parts])
     return trimesh.Trimesh(vertices, faces, process=False)

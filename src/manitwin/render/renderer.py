@@ -84,7 +84,7 @@ class Renderer:
         # the object is enclosed in a sphere of radius 1
         center, scale = (low + high) / 2, 2 / float(np.linalg.norm(high - low))
         del points
-        texels_a_unit = TEXELS_A_PIXEL * pixels_a_unit(cameras, center, 1 / scale)
+        texels_a_unit = TEXELS_A_PIXEL * max_pixels_per_unit(cameras, center, 1 / scale)
         surfaces = [render_surface(part, texels_a_unit=texels_a_unit) for part in parts]
         if not with_backs:
             surfaces = [front_faces(surface) for surface in surfaces]
@@ -93,7 +93,7 @@ class Renderer:
             entities.append(self._entity(surfaces.pop(0), center, scale))
             self._scene.add_entity(entities[-1])
         try:
-            return [self._shoot(camera, center, scale, background, supersample) for camera in cameras]
+            return [self._capture_frame(camera, center, scale, background, supersample) for camera in cameras]
         finally:
             for entity in entities:
                 self._scene.remove_entity(entity)
@@ -132,7 +132,7 @@ class Renderer:
             self._size = width, height
         return self._camera, self._mount
 
-    def _shoot(
+    def _capture_frame(
         self, camera: Camera, center: np.ndarray, scale: float, background: tuple[int, int, int], k: int
     ) -> Frame:
         component, entity = self._camera_of(camera.width_px * k, camera.height_px * k)
@@ -155,7 +155,7 @@ class Renderer:
         )
 
 
-def pixels_a_unit(cameras: Sequence[Camera], center: np.ndarray, radius: float) -> float:
+def max_pixels_per_unit(cameras: Sequence[Camera], center: np.ndarray, radius: float) -> float:
     """Return the pixels per unit of length in an object's closest view; its sphere is ``center (3,)``, ``radius``."""
     distances = [max(float(np.linalg.norm(camera.position - center)), radius / 8) for camera in cameras]
     return max(camera.focal_px / far for camera, far in zip(cameras, distances, strict=True))
@@ -173,7 +173,7 @@ class Frame:
     coverage: np.ndarray
     depth: np.ndarray
 
-    def over(self, old: tuple[int, int, int], new: tuple[int, int, int]) -> np.ndarray:
+    def composited_over(self, old: tuple[int, int, int], new: tuple[int, int, int]) -> np.ndarray:
         """Return ``rgb`` composited over the background ``new`` instead of ``old``."""
         empty, picture = 1 - self.coverage, np.empty_like(self.rgb)
         for channel, step in enumerate(np.array(new, np.float32) - np.array(old, np.float32)):

@@ -30,7 +30,7 @@ class Lighting:
     ambient: np.ndarray
     lights: tuple[DirectionalLight, ...]
 
-    def exposed(self) -> Lighting:
+    def with_auto_exposure(self) -> Lighting:
         """Return the lights scaled by a common factor so that level white paper has the brightness ``WHITE_PAPER``.
 
         Lambert's law: a white surface under irradiance E at an angle a has the radiance E cos(a) / pi. Lights from below are

@@ -24,7 +24,7 @@ from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform
 from manitwin.render.cameras import Camera, sapien_axes
 from manitwin.render.device import render_scene
-from manitwin.render.drawable import Drawable, drawable
+from manitwin.render.drawable import Drawable, prepare_drawable
 from manitwin.render.scene_lighting import STUDIO, Lighting
 from manitwin.render.surfaces import plain_part, render_surface, scene_shape
 
@@ -134,13 +134,13 @@ class SceneRenderer:
         """
         if name in self._entities:
             raise UsageError(f"the scene has a thing {name!r} already; give each its own name")
-        uploaded = _uploaded(self._sapien.render, thing if isinstance(thing, Drawable) else drawable(thing))
+        uploaded = _uploaded(self._sapien.render, thing if isinstance(thing, Drawable) else prepare_drawable(thing))
         number = len(self._entities) + 1
         seen = self._sapien.render.RenderBodyComponent()
         for each in uploaded.surfaces:
             seen.attach(each.clone())  # a shape belongs to one body; its clone shares vertices and textures
-        entity = self._placed(seen, np.eye(4) if pose is None else pose)
-        _throw_no_shadow(seen)
+        entity = self._add_component(seen, np.eye(4) if pose is None else pose)
+        _exclude_from_shadows(seen)
         self._entities[name] = number, entity
         self._casters[name] = self._shadow_caster(uploaded.shadow, entity.pose)
         return number
@@ -149,7 +149,7 @@ class SceneRenderer:
         """Add an invisible object that casts a shadow."""
         body = self._sapien.render.RenderBodyComponent()
         body.attach(shape.clone())
-        entity = self._placed(body, np.eye(4))
+        entity = self._add_component(body, np.eye(4))
         entity.set_pose(pose)
         # rendered only by a second G-buffer pass, which shaders/scene lacks, and into shadow maps
         body.shading_mode = 1
@@ -200,14 +200,14 @@ class SceneRenderer:
         key = (shader, slot, camera.width_px * k, camera.height_px * k)
         if key not in self._cameras:
             component = self._sapien.render.RenderCameraComponent(key[2], key[3], str(SHADERS / shader))
-            self._cameras[key] = component, self._placed(component, np.eye(4))
+            self._cameras[key] = component, self._add_component(component, np.eye(4))
         component, entity = self._cameras[key]
         component.set_fovy(camera.fov_y_rad, True)
         component.near, component.far = NEAR_M, FAR_M
         entity.set_pose(self._sapien.Pose(transform(sapien_axes(camera), camera.position)))
         return component
 
-    def _placed(self, component: Any, pose: np.ndarray) -> Any:
+    def _add_component(self, component: Any, pose: np.ndarray) -> Any:
         entity = self._sapien.Entity()
         entity.add_component(component)
         entity.set_pose(self._sapien.Pose(pose))
@@ -221,7 +221,7 @@ class SceneRenderer:
             )
         if sum(light.casts_shadow for light in lighting.lights) > 1:
             raise UsageError("of a scene's directional lights one at most casts shadows; switch it off for the others")
-        lighting = lighting.exposed()
+        lighting = lighting.with_auto_exposure()
         self._scene.set_ambient_light(lighting.ambient.tolist())
         # the order expected by the shader: the one looking down, the one with shadows, the others
         self._add_shadowed(np.array([0.0, 0.0, -1.0]), np.zeros(3), region, region.map_px // 2)
@@ -256,11 +256,11 @@ class SceneRenderer:
         shape.material.set_emission([0.0, 0.0, 0.0, 1.0])  # tells the shader to fade it
         body = self._sapien.render.RenderBodyComponent()
         body.attach(shape)
-        self._placed(body, np.eye(4))
-        _throw_no_shadow(body)  # nothing is below it
+        self._add_component(body, np.eye(4))
+        _exclude_from_shadows(body)  # nothing is below it
 
 
-def _throw_no_shadow(body: Any) -> None:
+def _exclude_from_shadows(body: Any) -> None:
     """Exclude a body in a scene from the shadow and height maps."""
     for part in body._internal_node.children:  # the only access in SAPIEN 3.0.3
         part.cast_shadow = False

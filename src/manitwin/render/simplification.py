@@ -44,11 +44,11 @@ def simplified(
     places = np.arange(len(vertices)) if places is None else places
     points = np.empty((int(places.max()) + 1, 3))
     points[places] = vertices
-    quadrics, products = _quadrics(points, places[faces]), _products(points)
+    quadrics, products = _quadrics(points, places[faces]), _quadric_monomials(points)
     _add_planes_across_seams(quadrics, points, faces, places, keep_open_edges)
     for number in range(_ROUNDS):
         shuffle = (np.arange(1, len(points) + 1) * (number + 1) * _GOLDEN) % 1.0
-        moves = _possible_moves(faces, places, len(points), keep_open_edges)
+        moves = _valid_collapses(faces, places, len(points), keep_open_edges)
         chosen = _round(points, places[faces], quadrics, products, moves, tolerance_m**2, shuffle)
         # several vertices may be collapsed into one
         np.add.at(quadrics, moves.end[chosen], quadrics[moves.start[chosen]])
@@ -63,7 +63,7 @@ def simplified(
 
 
 @dataclass(frozen=True)
-class _Moves:
+class _EdgeCollapses:
     """Collapses of points ``start (M,)`` into ``end (M,)``, with the vertices on both sides of the edge.
 
     ``vertices (2, 2, M)``: by side, from and to; equal for both sides unless the edge is on a seam.
@@ -97,7 +97,7 @@ class _HalfEdges:
     doubled: np.ndarray
 
     @classmethod
-    def of(cls, faces: np.ndarray, places: np.ndarray, count: int) -> _HalfEdges:
+    def from_faces(cls, faces: np.ndarray, places: np.ndarray, count: int) -> _HalfEdges:
         """Find the adjacent sides; ``count`` is the number of points."""
         start, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
         first, last = places[start], places[end]
@@ -116,9 +116,9 @@ class _HalfEdges:
         return cls(start, end, other_start, other_end, is_open, doubled)
 
 
-def _possible_moves(faces: np.ndarray, places: np.ndarray, count: int, keep_open_edges: bool) -> _Moves:
+def _valid_collapses(faces: np.ndarray, places: np.ndarray, count: int, keep_open_edges: bool) -> _EdgeCollapses:
     """Return the edge collapses that preserve surface, open edges and seams; ``count`` is the number of points."""
-    e = _HalfEdges.of(faces, places, count)
+    e = _HalfEdges.from_faces(faces, places, count)
     used = np.zeros(len(places), bool)
     used[faces] = True
     vertices_at = np.bincount(places[used], minlength=count)
@@ -136,14 +136,14 @@ def _possible_moves(faces: np.ndarray, places: np.ndarray, count: int, keep_open
     one = sides[0, 0] == sides[1, 0]
     whole = np.where(one, (sides[0, 1] == sides[1, 1]) & (vertices_at[start] == 1), vertices_at[start] == 2)
     possible = np.flatnonzero(whole & ~kept[start] & (is_open | ~(rim[start] & rim[end])))
-    return _Moves(start[possible], end[possible], sides[:, :, possible])
+    return _EdgeCollapses(start[possible], end[possible], sides[:, :, possible])
 
 
 def _add_planes_across_seams(
     quadrics: np.ndarray, points: np.ndarray, faces: np.ndarray, places: np.ndarray, keep_open_edges: bool
 ) -> None:
     """Add planes through seams and open edges, perpendicular to their faces, to penalize moving off the edge."""
-    e = _HalfEdges.of(faces, places, len(points))
+    e = _HalfEdges.from_faces(faces, places, len(points))
     held = (e.start != e.other_start) | (e.end != e.other_end)
     if not keep_open_edges:
         held |= e.open
@@ -180,7 +180,7 @@ def _forms(normals: np.ndarray, through: np.ndarray) -> np.ndarray:
     return np.asarray(planes[:, _ROW] * planes[:, _COLUMN])
 
 
-def _products(points: np.ndarray) -> np.ndarray:
+def _quadric_monomials(points: np.ndarray) -> np.ndarray:
     """Return the factors by which the forms of ``_quadrics`` are evaluated at each point ``(P, 10)``."""
     homogeneous = np.column_stack([points, np.ones(len(points))])
     return np.asarray(homogeneous[:, _ROW] * homogeneous[:, _COLUMN] * np.where(_ROW == _COLUMN, 1, 2))
@@ -191,7 +191,7 @@ def _round(
     faces: np.ndarray,
     quadrics: np.ndarray,
     products: np.ndarray,
-    moves: _Moves,
+    moves: _EdgeCollapses,
     most: float,
     shuffle: np.ndarray,
 ) -> np.ndarray:

@@ -15,8 +15,8 @@ import numpy as np
 import trimesh
 from PIL import Image
 
+from manitwin.formats.meshes.shading_normals import with_creased_normals
 from manitwin.formats.meshes.textures import make_part, material_of, pbr_material, uv_of
-from manitwin.formats.meshes.triangles import with_creased_normals
 
 MAX_TEXTURE_PX = 2048  # larger textures only cost time and cause aliasing
 SPECULAR = 0.5  # dielectric reflectance of 0.5 * 0.08 = 4 %, the default of glTF 2.0 (index of refraction 1.5)

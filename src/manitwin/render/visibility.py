@@ -30,7 +30,7 @@ def is_closed_and_outward(mesh: trimesh.Trimesh) -> bool:
     return bool((volumes[np.unique(piece)] > 0).all())  # unused vertices are components of their own
 
 
-def faces_seen_from_outside(mesh: trimesh.Trimesh, *, from_behind: bool = False) -> np.ndarray:
+def externally_visible_faces(mesh: trimesh.Trimesh, *, from_behind: bool = False) -> np.ndarray:
     """Return for each face ``(F,) bool`` whether its outward side, or its back, is visible from outside.
 
     Rays are cast in 128 directions, 14 degrees apart, from points 8 mm apart on each side (or a 24th of its length if longer

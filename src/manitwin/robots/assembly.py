@@ -123,7 +123,7 @@ def add_inertial(link: etree._Element, boxes: list[PlacedBox], density_kg_m3: fl
     add(inertial, "inertia", **{key: repr(float(tensor[at])) for key, at in keys.items()})
 
 
-def settle_arm_joints(
+def configure_arm_joints(
     tree: UrdfTree, arm_joints: tuple[str, ...], tip_link: str, limits_rad: dict[str, tuple[float, float]]
 ) -> None:
     """Check that ``arm_joints`` form the chain from the root to the tip, and narrow their limits in place.
@@ -181,12 +181,12 @@ def _settle_arm_joint(tree: UrdfTree, name: str, given: tuple[float, float] | No
         raise ConfigError(f"{tree.name}: arm joint {name} has no range; give a lower limit below the upper one")
 
 
-def limits_of(tree: UrdfTree, names: tuple[str, ...], key: str) -> np.ndarray:
+def joint_limits(tree: UrdfTree, names: tuple[str, ...], key: str) -> np.ndarray:
     """Return one attribute of each joint's ``<limit>``, ``(n,)``: ``lower``, ``upper`` or ``velocity``."""
     return np.array([float(tree.joint(name).find("limit").get(key)) for name in names])
 
 
-def settle_finger_joints(tree: UrdfTree, names: tuple[str, str], half_opening_m: float) -> None:
+def configure_finger_joints(tree: UrdfTree, names: tuple[str, str], half_opening_m: float) -> None:
     """Check the joints of the two fingers, remove their ``<mimic>``, and set their range from 0 to half of the opening.
 
     Raises ConfigError if a joint is not prismatic, if its range is too small, or if it mimics anything other than the

@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
-from manitwin.errors import ConfigError, Unavailable, UsageError, choose_from
+from manitwin.errors import ConfigError, Unavailable, UsageError, unknown_name_message
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.toml_file import MAX_TOML_BYTES, parse_toml
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
@@ -150,7 +150,7 @@ def definition_path(name_or_path: str) -> Path:
             )
         return path
     if name_or_path not in shipped:
-        raise UsageError(choose_from("robot", name_or_path, shipped) + ", or a .toml file")
+        raise UsageError(unknown_name_message("robot", name_or_path, shipped) + ", or a .toml file")
     folder = _shipped_folder() if name_or_path in shipped_robots() else _two_arms_folder()
     return folder / f"{name_or_path}.toml"
 

@@ -19,7 +19,7 @@ from manitwin.formats.installation import import_remedy
 from manitwin.formats.printable import printable_line
 from manitwin.formats.xml_file import read_xml
 from manitwin.robots.definition import RobotDefinition
-from manitwin.robots.links import LinkShape, links_of_urdf
+from manitwin.robots.links import LinkShape, read_urdf_links
 from manitwin.robots.urdf import UrdfTree, child_of, parent_of
 
 STATES = 300
@@ -39,7 +39,7 @@ def disabled_pairs(tree: UrdfTree, srdf: Path | None, definition: RobotDefinitio
     if srdf is not None:
         pairs |= _of_srdf(srdf, tree)
     else:
-        pairs |= _in_contact(tree, definition)
+        pairs |= _contact_pairs(tree, definition)
     return tuple(sorted(pairs))
 
 
@@ -52,13 +52,13 @@ def _adjacent(tree: UrdfTree) -> set[tuple[str, str]]:
     return {
         _pair(first, second)
         for joint in tree.joints.values()
-        for first in _solid(tree, parent_of(joint), up=True)
-        for second in _solid(tree, child_of(joint), up=False)
+        for first in _nearest_solid_links(tree, parent_of(joint), up=True)
+        for second in _nearest_solid_links(tree, child_of(joint), up=False)
         if first != second
     }
 
 
-def _solid(tree: UrdfTree, link: str, up: bool) -> Iterable[str]:
+def _nearest_solid_links(tree: UrdfTree, link: str, up: bool) -> Iterable[str]:
     """Return the link itself if it has shapes, otherwise the nearest links with shapes above or below it across fixed joints."""
     if tree.links[link].find("collision") is not None:
         return [link]
@@ -67,12 +67,12 @@ def _solid(tree: UrdfTree, link: str, up: bool) -> Iterable[str]:
         for joint in tree.joints.values()
         if (child_of(joint) if up else parent_of(joint)) == link and joint.get("type") == "fixed"
     ]
-    return [name for other in near for name in _solid(tree, other, up)]
+    return [name for other in near for name in _nearest_solid_links(tree, other, up)]
 
 
 def _within_hand(tree: UrdfTree, palm: str) -> set[tuple[str, str]]:
     """Return all pairs within the hand, because the fingers touch when it closes."""
-    hand = tree.below(palm)
+    hand = tree.subtree_links(palm)
     return {_pair(first, second) for first, second in combinations(hand, 2)}
 
 
@@ -98,7 +98,7 @@ def _check_pairs(shapes: Counter[int], name: str) -> None:
         )
 
 
-def _in_contact(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, str]]:
+def _contact_pairs(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, str]]:
     """Return pairs whose convex hulls collide at home, or in at least 90 % of random joint states."""
     try:
         import coal
@@ -115,7 +115,7 @@ def _in_contact(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, s
             f"{definition.name}: Pinocchio cannot read its URDF ({said}); correct its numbers and joints"
         ) from error
     owners: list[str] = []
-    links_with_shapes = [(model.frames[model.getBodyId(link.name)], link) for link in links_of_urdf(urdf)]
+    links_with_shapes = [(model.frames[model.getBodyId(link.name)], link) for link in read_urdf_links(urdf)]
     shapes = Counter[int]()
     for frame, link in links_with_shapes:
         shapes[frame.parentJoint] += len(link.shapes)

@@ -40,7 +40,7 @@ class LinkShape:
         low, high = self.corners_m.min(0), self.corners_m.max(0)
         return self.shape_to_link @ transform(translation=(low + high) / 2), (high - low) / 2
 
-    def solid(self) -> trimesh.Trimesh:
+    def to_mesh(self) -> trimesh.Trimesh:
         """Return the shape as a mesh in the link frame; a sphere as an inscribed icosphere of 1280 triangles."""
         if self.half_extents_m is not None:
             mesh = trimesh.creation.box(2 * self.half_extents_m)
@@ -82,14 +82,14 @@ class Link:
         return np.linalg.inv(self.joint_to_link)
 
 
-def links_of(tree: UrdfTree, find_mesh: Callable[[str], Path]) -> tuple[Link, ...]:
+def read_links(tree: UrdfTree, find_mesh: Callable[[str], Path]) -> tuple[Link, ...]:
     """Return the links of a checked URDF, parents before children; ``find_mesh`` maps mesh names to files.
 
     Meshes become their convex hulls; visuals are ignored. Raises the tree's error if a joint has no limits or a mesh has no
     convex hull.
     """
     holders = {child_of(joint): joint for joint in tree.joints.values()}
-    links, order = tree.links, tree.below(*tree.roots())
+    links, order = tree.links, tree.subtree_links(*tree.roots())
     return tuple(_link(tree, find_mesh, links[name], holders.get(name), order) for name in order)
 
 
@@ -115,7 +115,7 @@ def _link(
     if joint.get("type") in ("revolute", "prismatic"):
         limit = joint.find("limit")
         if limit is None or limit.get("lower") is None or limit.get("upper") is None:
-            raise tree.refuse(f"joint {holder!r}", "lacks lower or upper of its <limit>", "give both")
+            raise tree.make_error(f"joint {holder!r}", "lacks lower or upper of its <limit>", "give both")
         limits = float(limit.get("lower")), float(limit.get("upper"))
     direction = np.zeros(3) if axis is None else values_of(axis, "xyz")
     if not direction.any():  # the default axis is X; a fixed joint may have zeros
@@ -151,7 +151,7 @@ def _shape(tree: UrdfTree, find_mesh: Callable[[str], Path], collision: etree._E
 def _hull(tree: UrdfTree, path: Path, where: str) -> np.ndarray:
     """Return the vertices ``(V, 3)`` of a mesh's convex hull."""
     if path.suffix.lower() not in MESH_SUFFIXES:
-        raise tree.refuse(f"the mesh of {where}", f"is {path}", f"valid are {', '.join(MESH_SUFFIXES)}")
+        raise tree.make_error(f"the mesh of {where}", f"is {path}", f"valid are {', '.join(MESH_SUFFIXES)}")
     if path.suffix.lower() == ".dae":
         # refuses XML entities before the mesh library reads it
         read_xml(path, "COLLADA", name=str(path), refusal=tree.error)
@@ -159,18 +159,18 @@ def _hull(tree: UrdfTree, path: Path, where: str) -> np.ndarray:
         return np.asarray(trimesh.convex.convex_hull(trimesh.load_mesh(path)).vertices)
     except Exception as error:  # mesh readers raise arbitrary exceptions
         reason = " ".join(str(error).split())[:120]
-        raise tree.refuse(
+        raise tree.make_error(
             f"the mesh of {where}, {path},", f"has no convex hull ({reason})", "repair or replace it"
         ) from error
 
 
 @lru_cache(maxsize=16)
-def links_of_urdf(urdf: str) -> tuple[Link, ...]:
+def read_urdf_links(urdf: str) -> tuple[Link, ...]:
     """Return the links of a URDF text, parents first; meshes, named by absolute path, become their convex hulls.
 
     Raises ConfigError if a mesh cannot be read.
     """
-    return links_of(UrdfTree.of_text(urdf), Path)
+    return read_links(UrdfTree.of_text(urdf), Path)
 
 
 def link_poses(links: tuple[Link, ...], joints: dict[str, float]) -> np.ndarray:
@@ -196,13 +196,13 @@ def poses_at(links: tuple[Link, ...], joints: dict[str, float]) -> dict[str, np.
 
 
 @lru_cache(maxsize=16)
-def bodies_of_urdf(urdf: str, palm: str) -> tuple[tuple[Link, ...], dict[str, tuple[str, np.ndarray]]]:
+def read_rigid_bodies(urdf: str, palm: str) -> tuple[tuple[Link, ...], dict[str, tuple[str, np.ndarray]]]:
     """Return the robot's bodies: each link merged with the links fixed to it, except the palm, which stays separate.
 
     Fewer joints make the simulation faster. The palm is a separate body because it may touch objects that the wrist may not.
     Also returns, for every link, the name of its body and its pose ``(4, 4)`` in that body.
     """
-    links = links_of_urdf(urdf)
+    links = read_urdf_links(urdf)
     part_of: dict[str, tuple[str, np.ndarray]] = {}
     members: dict[str, list[tuple[Link, np.ndarray]]] = {}
     for link in links:
@@ -214,10 +214,10 @@ def bodies_of_urdf(urdf: str, palm: str) -> tuple[tuple[Link, ...], dict[str, tu
         owner, pose = part_of[link.name]
         members.setdefault(owner, []).append((link, pose))
     order = list(members)
-    return tuple(_joined(links, members[name], part_of, order) for name in order), part_of
+    return tuple(_merge_links(links, members[name], part_of, order) for name in order), part_of
 
 
-def _joined(
+def _merge_links(
     links: tuple[Link, ...],
     members: list[tuple[Link, np.ndarray]],
     part_of: dict[str, tuple[str, np.ndarray]],

@@ -12,10 +12,10 @@ from manitwin.errors import ConfigError
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.geometry.poses import inverse
 from manitwin.robots.assembly import (
+    configure_arm_joints,
+    configure_finger_joints,
     fix_other_joints,
-    limits_of,
-    settle_arm_joints,
-    settle_finger_joints,
+    joint_limits,
 )
 from manitwin.robots.definition import (
     MAX_FILE_BYTES,
@@ -29,10 +29,10 @@ from manitwin.robots.definition import (
 from manitwin.robots.disabled_pairs import disabled_pairs
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
-from manitwin.robots.links import links_of_urdf, poses_at
+from manitwin.robots.links import poses_at, read_urdf_links
 from manitwin.robots.mounted_hands import MountedHand, mount_hand, read_arm
 from manitwin.robots.robot import Robot
-from manitwin.robots.two_arms import is_of_two_arms, load_two_arms
+from manitwin.robots.two_arms import is_two_arm_file, load_two_arms
 from manitwin.robots.urdf import UrdfTree, parent_of
 
 __all__ = ["load_robot", "shipped_robots", "shipped_two_arms"]
@@ -58,20 +58,20 @@ def _load_shipped(path: Path) -> Robot:
 
 
 def _load(path: Path) -> Robot:
-    if is_of_two_arms(path):
-        return load_two_arms(path, lambda name: _load_one_arm(_beside(name, path.parent), path))
+    if is_two_arm_file(path):
+        return load_two_arms(path, lambda name: _load_one_arm(_resolve_name(name, path.parent), path))
     definition, sha256 = read_definition(path)
     gripper = _gripper(definition.hand.gripper, path.parent)
     files = urdf_files(definition.urdf, path.parent, definition.name)
     tree = read_arm(files.urdf)
-    tree.keep_below(definition.base_link)
+    tree.keep_subtree(definition.base_link)
     names_in_files = tree.text()
-    tree.use_meshes(files.mesh)
+    tree.set_mesh_paths(files.mesh)
     hand = mount_hand(tree, definition, gripper, path.parent)
-    settle_arm_joints(tree, definition.arm_joints, hand.tip_link, definition.limits_rad)
+    configure_arm_joints(tree, definition.arm_joints, hand.tip_link, definition.limits_rad)
     if isinstance(gripper, ParallelGripper):
         first, second = hand.finger_joints
-        settle_finger_joints(tree, (first, second), gripper.opening_m / 2)
+        configure_finger_joints(tree, (first, second), gripper.opening_m / 2)
     fix_other_joints(tree, definition.arm_joints + hand.finger_joints, definition.fixed_joints)
     _check_home(tree, definition)
     palm = _palm(tree, hand, gripper)
@@ -87,14 +87,14 @@ def _load(path: Path) -> Robot:
         tip_link=hand.tip_link,
         gripper_to_tip=hand.gripper_to_tip,
         gripper=gripper,
-        hand_links=tree.below(palm),
+        hand_links=tree.subtree_links(palm),
         finger_links=hand.finger_links,
         disabled_pairs=disabled_pairs(tree, files.srdf, definition, palm),
         home_rad=np.array(definition.home_rad),
-        velocity_limits_rad_s=definition.velocity_fraction * limits_of(tree, definition.arm_joints, "velocity"),
+        velocity_limits_rad_s=definition.velocity_fraction * joint_limits(tree, definition.arm_joints, "velocity"),
         acceleration_limits_rad_s2=np.full(len(definition.arm_joints), definition.acceleration_rad_s2),
         workspace=definition.workspace,
-        fastest_rad_s=limits_of(tree, definition.arm_joints, "velocity"),
+        fastest_rad_s=joint_limits(tree, definition.arm_joints, "velocity"),
     )
     if isinstance(gripper, ParallelGripper):
         _check_jaws(robot, gripper)
@@ -102,16 +102,16 @@ def _load(path: Path) -> Robot:
 
 
 def _load_one_arm(name_or_path: str, wanted_by: Path) -> Robot:
-    if is_of_two_arms(definition_path(name_or_path)):
+    if is_two_arm_file(definition_path(name_or_path)):
         raise ConfigError(f"robot file {wanted_by}: {name_or_path} has two arms itself; name a robot with one arm")
     return load_robot(name_or_path)
 
 
 def _gripper(name: str, folder: Path) -> Gripper:
-    return load_gripper(_beside(name, folder, "gripper"))
+    return load_gripper(_resolve_name(name, folder, "gripper"))
 
 
-def _beside(name: str, folder: Path, kind: str = "robot") -> str:
+def _resolve_name(name: str, folder: Path, kind: str = "robot") -> str:
     """Return a shipped name unchanged, or the path of a named file below a folder; raises ConfigError if it is missing."""
     if not name.endswith(".toml"):
         return name
@@ -133,7 +133,7 @@ def _palm(tree: UrdfTree, hand: MountedHand, gripper: Gripper) -> str:
 
 def _check_home(tree: UrdfTree, definition: RobotDefinition) -> None:
     for name, value in zip(definition.arm_joints, definition.home_rad, strict=True):
-        lower, upper = (float(limits_of(tree, (name,), key)[0]) for key in ("lower", "upper"))
+        lower, upper = (float(joint_limits(tree, (name,), key)[0]) for key in ("lower", "upper"))
         if not lower <= value <= upper:
             raise ConfigError(
                 f"robot {definition.name}: home_rad of {name} is {value:g}; its limits are {lower:g} to {upper:g}"
@@ -142,7 +142,7 @@ def _check_home(tree: UrdfTree, definition: RobotDefinition) -> None:
 
 def _check_jaws(robot: Robot, gripper: ParallelGripper) -> None:
     """Raise ConfigError unless the fingers open along X and end where the gripper file says."""
-    links = links_of_urdf(robot.urdf)
+    links = read_urdf_links(robot.urdf)
     poses = poses_at(links, {})
     to_grasp = inverse(poses[robot.tip_link] @ robot.gripper_to_tip)
     furthest_m = []

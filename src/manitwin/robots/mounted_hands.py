@@ -15,7 +15,7 @@ from manitwin.geometry.poses import inverse
 from manitwin.robots.assembly import SIDES, finger_joint, finger_link, generated_hand, mount, palm_link
 from manitwin.robots.definition import DescribedHand, GeneratedHand, MergedHand, RobotDefinition, urdf_files
 from manitwin.robots.generated_cup import cup_joint, cup_link, generated_cup
-from manitwin.robots.grippers.gripper import Gripper, of_kind
+from manitwin.robots.grippers.gripper import Gripper, require_kind
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.grippers.suction import SuctionGripper
@@ -44,13 +44,13 @@ def mount_hand(tree: UrdfTree, definition: RobotDefinition, gripper: Gripper, fo
     """
     hand = definition.hand
     if isinstance(hand, DescribedHand):
-        return _mount_described(tree, hand, of_kind(gripper, MultiFingerGripper))
+        return _mount_described(tree, hand, require_kind(gripper, MultiFingerGripper))
     if isinstance(hand, GeneratedHand) and isinstance(gripper, SuctionGripper):
         added = generated_cup(gripper, hand.mass_kg)
         mount(tree, added, hand.mount_link, palm_link(gripper.name), hand.gripper_to_mount.matrix())
         lip = (cup_joint(gripper.name),), (cup_link(gripper.name),)
         return MountedHand(palm_link(gripper.name), *lip, np.eye(4), added.text())
-    jaws = of_kind(gripper, ParallelGripper)
+    jaws = require_kind(gripper, ParallelGripper)
     if isinstance(hand, GeneratedHand):
         added = generated_hand(jaws, hand.mass_kg)
         mount(tree, added, hand.mount_link, palm_link(jaws.name), hand.gripper_to_mount.matrix())
@@ -61,9 +61,9 @@ def mount_hand(tree: UrdfTree, definition: RobotDefinition, gripper: Gripper, fo
     if isinstance(hand, MergedHand):
         files = urdf_files(hand.urdf, folder, definition.name)
         added = read_arm(files.urdf)
-        added.keep_below(hand.root_link)
+        added.keep_subtree(hand.root_link)
         names_in_files = added.text()
-        added.use_meshes(files.mesh)
+        added.set_mesh_paths(files.mesh)
         mount(tree, added, hand.mount_link, hand.root_link, hand.root_to_mount.matrix())
     tree.link(hand.tip_link)
     links = tuple(child_of(tree.joint(name)) for name in hand.finger_joints)
@@ -72,10 +72,10 @@ def mount_hand(tree: UrdfTree, definition: RobotDefinition, gripper: Gripper, fo
 
 def read_arm(path: Path) -> UrdfTree:
     """Read a URDF, keeping only links, joints and materials."""
-    return _links_alone(read_urdf(path))
+    return _keep_kinematics(read_urdf(path))
 
 
-def _links_alone(tree: UrdfTree) -> UrdfTree:
+def _keep_kinematics(tree: UrdfTree) -> UrdfTree:
     for element in list(tree.element):
         if element.tag not in ("link", "joint", "material"):
             tree.element.remove(element)
@@ -83,7 +83,7 @@ def _links_alone(tree: UrdfTree) -> UrdfTree:
 
 
 def _mount_described(tree: UrdfTree, hand: DescribedHand, gripper: MultiFingerGripper) -> MountedHand:
-    added = _links_alone(read_urdf(gripper.urdf_path, HAND))
+    added = _keep_kinematics(read_urdf(gripper.urdf_path, HAND))
     (root,) = added.roots()
     names_in_files = added.text()
     _find_meshes(added, gripper.mesh_path)

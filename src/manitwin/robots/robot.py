@@ -99,7 +99,7 @@ class Robot:
         """Return the positions ``(J,)`` of ``finger_joints`` for a recorded hand state ``(h,)``."""
         return np.repeat(hand_state / 2, 2) if self.has_jaws else np.asarray(hand_state, float)
 
-    def side_of(self, link: str) -> int | None:
+    def contact_side(self, link: str) -> int | None:
         """Return on which side of the held object a link presses, 0 or 1; None if it is not meant to press.
 
         Side 0 is the first jaw, a cup, or thumb and palm; side 1 is the second jaw or the other fingers.

@@ -47,7 +47,7 @@ class TwoArmsDefinition(BaseModel):
     arms: Annotated[tuple[ArmField, ...], Field(min_length=2, max_length=2)]
 
 
-def is_of_two_arms(path: Path) -> bool:
+def is_two_arm_file(path: Path) -> bool:
     """Tell whether a robot file defines two arms; raises ConfigError if the file cannot be read."""
     return "arms" in parse_toml(_content(path), f"robot file {path}", ConfigError)
 
@@ -76,29 +76,29 @@ def load_two_arms(path: Path, load: Callable[[str], Robot]) -> Robot:
                 f"robot file {path}: arm {name} has {robot.gripper.name}; both arms need the same two-jaw gripper"
             )
     arms = [
-        placed_arm(robot, each.name, each.base_to_world.matrix())
+        place_arm(robot, each.name, each.base_to_world.matrix())
         for robot, each in zip(own, definition.arms, strict=True)
     ]
     digests = (hashlib.sha256(content).hexdigest(), *(robot.sha256 for robot in own))
-    return _together(definition, arms, hashlib.sha256("\n".join(digests).encode()).hexdigest())
+    return _combine_arms(definition, arms, hashlib.sha256("\n".join(digests).encode()).hexdigest())
 
 
-def placed_arm(robot: Robot, name: str, base_to_world: np.ndarray) -> Robot:
+def place_arm(robot: Robot, name: str, base_to_world: np.ndarray) -> Robot:
     """Return a single-arm robot as the arm ``name``, with its base fixed at a pose ``(4, 4)`` in the world."""
     tree = UrdfTree.of_text(robot.urdf)
     (base,) = tree.roots()
     for element in (*tree.links.values(), *tree.joints.values()):
-        element.set("name", named(name, element.get("name")))
+        element.set("name", prefixed_name(name, element.get("name")))
     for tag, key in (("parent", "link"), ("child", "link"), ("mimic", "joint")):
         for element in tree.element.iterfind(f"joint/{tag}"):
-            element.set(key, named(name, element.get(key)))
-    world = named(name, WORLD)
+            element.set(key, prefixed_name(name, element.get(key)))
+    world = prefixed_name(name, WORLD)
     add(tree.element, "link", name=world)
-    joint = add_joint(tree.element, f"{world}_joint", "fixed", world, named(name, base))
+    joint = add_joint(tree.element, f"{world}_joint", "fixed", world, prefixed_name(name, base))
     set_origin(joint, base_to_world)
 
     def of(names: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(named(name, each) for each in names)
+        return tuple(prefixed_name(name, each) for each in names)
 
     return replace(
         robot,
@@ -106,24 +106,24 @@ def placed_arm(robot: Robot, name: str, base_to_world: np.ndarray) -> Robot:
         urdf=tree.text(),
         arm_joints=of(robot.arm_joints),
         finger_joints=of(robot.finger_joints),
-        tip_link=named(name, robot.tip_link),
+        tip_link=prefixed_name(name, robot.tip_link),
         hand_links=of(robot.hand_links),
         finger_links=of(robot.finger_links),
-        disabled_pairs=tuple((named(name, one), named(name, two)) for one, two in robot.disabled_pairs),
+        disabled_pairs=tuple((prefixed_name(name, one), prefixed_name(name, two)) for one, two in robot.disabled_pairs),
     )
 
 
 def base_to_world(arm: Robot) -> np.ndarray:
     """Return the base pose ``(4, 4)`` of one of two arms in the world."""
-    return origin_of(UrdfTree.of_text(arm.urdf).joint(f"{named(arm.name, WORLD)}_joint"))
+    return origin_of(UrdfTree.of_text(arm.urdf).joint(f"{prefixed_name(arm.name, WORLD)}_joint"))
 
 
-def named(arm: str, name: str) -> str:
+def prefixed_name(arm: str, name: str) -> str:
     """Return the name of a link or joint with its arm's prefix."""
     return f"{arm}_{name}"
 
 
-def _together(definition: TwoArmsDefinition, arms: list[Robot], sha256: str) -> Robot:
+def _combine_arms(definition: TwoArmsDefinition, arms: list[Robot], sha256: str) -> Robot:
     """Return both arms as one robot: concatenated joints, links and limits; hand and workspace of the first."""
     first, second = arms
 
@@ -157,7 +157,7 @@ def _one_tree(name: str, arms: list[Robot]) -> str:
     for arm in arms:
         for element in list(UrdfTree.of_text(arm.urdf).element):
             together.append(element)
-        root = named(arm.name, WORLD)
+        root = prefixed_name(arm.name, WORLD)
         set_origin(add_joint(together, f"{root}_at", "fixed", WORLD, root), np.eye(4))
     return UrdfTree(f"robot {name}", together).text()
 

@@ -13,7 +13,7 @@ import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 from scipy.spatial.transform import Rotation
 
-from manitwin.errors import ConfigError, ManiTwinError, choose_from
+from manitwin.errors import ConfigError, ManiTwinError, unknown_name_message
 from manitwin.formats.xml_file import add, parse_xml, xml_text
 from manitwin.geometry.poses import transform
 
@@ -44,21 +44,21 @@ class UrdfTree:
         """The joints by name, in the file's order."""
         return {joint.get("name"): joint for joint in self.element.findall("joint")}
 
-    def refuse(self, where: str, cause: str, remedy: str) -> ManiTwinError:
+    def make_error(self, where: str, cause: str, remedy: str) -> ManiTwinError:
         """Return the exception for an invalid part of the file, with a one-line message."""
         return self.error(f"{self.name}: {where}{' ' if where else ''}{cause}; {remedy}")
 
     def link(self, name: str) -> etree._Element:
         """Return a link; raises the tree's error naming the existing links."""
         if name not in self.links:
-            raise self.error(f"{self.name}: {choose_from('link', name, self.links)}")
+            raise self.error(f"{self.name}: {unknown_name_message('link', name, self.links)}")
         return self.links[name]
 
     def joint(self, name: str) -> etree._Element:
         """Return a joint; raises the tree's error naming the existing movable joints."""
         if name not in self.joints:
             movable = [key for key, joint in self.joints.items() if joint.get("type") != "fixed"]
-            raise self.error(f"{self.name}: {choose_from('joint', name, movable)}")
+            raise self.error(f"{self.name}: {unknown_name_message('joint', name, movable)}")
         return self.joints[name]
 
     def roots(self) -> list[str]:
@@ -66,7 +66,7 @@ class UrdfTree:
         held = {child_of(joint) for joint in self.joints.values()}
         return [name for name in self.links if name not in held]
 
-    def below(self, *links: str) -> tuple[str, ...]:
+    def subtree_links(self, *links: str) -> tuple[str, ...]:
         """Return the given links and all their descendants, parents first; raises the tree's error for an unknown link."""
         for name in set(links) - set(self.links):
             self.link(name)
@@ -78,9 +78,9 @@ class UrdfTree:
             order += children.get(name, [])
         return tuple(order)
 
-    def keep_below(self, link: str) -> None:
+    def keep_subtree(self, link: str) -> None:
         """Remove every link that is not ``link`` or one of its descendants, with its joint."""
-        kept = set(self.below(link))
+        kept = set(self.subtree_links(link))
         for name, element in self.links.items():
             if name not in kept:
                 self.element.remove(element)
@@ -88,7 +88,7 @@ class UrdfTree:
             if child_of(joint) not in kept or child_of(joint) == link:
                 self.element.remove(joint)
 
-    def use_meshes(self, find_mesh: Callable[[str], Path]) -> None:
+    def set_mesh_paths(self, find_mesh: Callable[[str], Path]) -> None:
         """Replace mesh names by the absolute paths that ``find_mesh`` returns."""
         for mesh in self.element.iter("mesh"):
             mesh.set("filename", str(find_mesh(mesh.get("filename"))))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from lxml import etree  # type: ignore[import-untyped]
 
-from manitwin.errors import ConfigError, ManiTwinError, choose_from
+from manitwin.errors import ConfigError, ManiTwinError, unknown_name_message
 from manitwin.formats.xml_file import MAX_NUMBER, read_xml
 from manitwin.robots.urdf import MOMENTS, UrdfTree, child_of, values_of
 
@@ -85,7 +85,7 @@ def read_urdf(
         prepare(root)
     tree = UrdfTree(name, root, rules.error)
     if rules.simulated and (macro := _first_macro(root)) is not None:
-        raise tree.refuse(
+        raise tree.make_error(
             f"<{macro}>", "is a xacro file, not a URDF", "run 'xacro FILE > FILE.urdf' and give the result"
         )
     _check_tree(tree, rules)
@@ -99,7 +99,7 @@ def read_urdf(
             and joint.get("type") != "fixed"
             and not all(values_of(a, "xyz").any() for a in joint.findall("axis"))
         ):
-            raise tree.refuse(f"the axis of joint {joint_name!r}", "has no direction", "give it one")
+            raise tree.make_error(f"the axis of joint {joint_name!r}", "has no direction", "give it one")
     for material in tree.element.findall("material"):
         _check_attributes(tree, rules, f"material {material.get('name')!r}", material, ("color",))
     return tree
@@ -116,38 +116,38 @@ def _first_macro(root: etree._Element) -> str | None:
 def _check_tree(tree: UrdfTree, rules: UrdfRules) -> None:
     """Check that links and joints have unique names and that the links form a tree."""
     if tree.element.find("link") is None:
-        raise tree.refuse("", "it has no <link>", "give a URDF with one")
+        raise tree.make_error("", "it has no <link>", "give a URDF with one")
     for tag in ("link", "joint"):
         names = Counter(element.get("name") for element in tree.element.findall(tag))
         for name, count in names.items():
             if not name:
-                raise tree.refuse(f"a <{tag}>", "has no name", "give it one")
+                raise tree.make_error(f"a <{tag}>", "has no name", "give it one")
             if count > 1:
-                raise tree.refuse(f"{tag} {name!r}", f"occurs {count} times", "give each its own name")
+                raise tree.make_error(f"{tag} {name!r}", f"occurs {count} times", "give each its own name")
     links, holders = tree.links, dict[str, str]()
     for name, joint in tree.joints.items():
         for end in ("parent", "child"):
             link = joint.find(end)
             if link is None or not link.get("link"):
-                raise tree.refuse(f"joint {name!r}", f"has no {end} link", f"name one of {', '.join(links)}")
+                raise tree.make_error(f"joint {name!r}", f"has no {end} link", f"name one of {', '.join(links)}")
             if link.get("link") not in links:
-                unknown = choose_from("link", link.get("link"), links)
+                unknown = unknown_name_message("link", link.get("link"), links)
                 raise tree.error(f"{tree.name}: the {end} of joint {name!r} is an {unknown}")
         if joint.get("type") not in rules.joint_types:
             kinds = ", ".join(rules.joint_types)
-            raise tree.refuse(f"joint {name!r}", f"is of the type {joint.get('type')!r}", f"valid are {kinds}")
+            raise tree.make_error(f"joint {name!r}", f"is of the type {joint.get('type')!r}", f"valid are {kinds}")
         other = holders.setdefault(child_of(joint), name)
         if other != name:
             two = f"is the child of two joints, {other!r} and {name!r}"
-            raise tree.refuse(f"link {child_of(joint)!r}", two, "the links must form a tree: remove one")
+            raise tree.make_error(f"link {child_of(joint)!r}", two, "the links must form a tree: remove one")
     roots = tree.roots()
-    reached = set(tree.below(*roots))
+    reached = set(tree.subtree_links(*roots))
     if circle := [name for name in links if name not in reached]:
         remedy = "the links must form a tree: remove one"
-        raise tree.refuse(f"the joints of {', '.join(circle)}", "form a loop", remedy)
+        raise tree.make_error(f"the joints of {', '.join(circle)}", "form a loop", remedy)
     if rules.simulated and len(roots) > 1:
         remedy = "the links must form a tree with one root: join them"
-        raise tree.refuse(f"the links {', '.join(roots)}", "all have no parent", remedy)
+        raise tree.make_error(f"the links {', '.join(roots)}", "all have no parent", remedy)
 
 
 def _check_link(tree: UrdfTree, rules: UrdfRules, where: str, link: etree._Element) -> None:
@@ -161,14 +161,14 @@ def _check_link(tree: UrdfTree, rules: UrdfRules, where: str, link: etree._Eleme
             if not one or geometries[0].tag not in rules.geometries:
                 named = ", ".join(f"<{geometry.tag}>" for geometry in geometries) or "nothing"
                 valid = f"give it one of {', '.join(rules.geometries)}"
-                raise tree.refuse(at, f"has {named[:80]} as its <geometry>", valid)
+                raise tree.make_error(at, f"has {named[:80]} as its <geometry>", valid)
             _check_attributes(tree, rules, at, shape, ("geometry/*",))
     for inertial in link.findall("inertial"):
         if rules.simulated and (inertial.find("mass") is None or inertial.find("inertia") is None):
-            raise tree.refuse(f"the inertial of {where}", "lacks <mass> or <inertia>", "give both, or leave it out")
+            raise tree.make_error(f"the inertial of {where}", "lacks <mass> or <inertia>", "give both, or leave it out")
         _check_attributes(tree, rules, f"the inertial of {where}", inertial, ("origin", "mass", "inertia"))
         if rules.simulated and float(inertial.find("mass").get("value")) < 0:
-            raise tree.refuse(f"the mass of {where}", "is negative", "mend it")
+            raise tree.make_error(f"the mass of {where}", "is negative", "mend it")
 
 
 def _check_attributes(
@@ -179,7 +179,7 @@ def _check_attributes(
         required = MOMENTS if element.tag == "inertia" and rules.simulated else _REQUIRED.get(element.tag, ())
         for key in required:
             if not element.get(key):
-                raise tree.refuse(f"the <{element.tag}> of {where}", f"lacks {key}", "give it")
+                raise tree.make_error(f"the <{element.tag}> of {where}", f"lacks {key}", "give it")
         for key, text in element.attrib.items():
             counts = _COUNTS.get((element.tag, key))
             if counts is None:
@@ -193,4 +193,4 @@ def _check_attributes(
             least = 0.0 if element.tag in _SIZES else -MAX_NUMBER
             if len(values) not in counts or not all(math.isfinite(v) and least <= v <= MAX_NUMBER for v in values):
                 wanted = f"needs {counts[0]} usable number{'s' if counts[0] > 1 else ''}"
-                raise tree.refuse(where, f"has <{element.tag} {key}={text[:40]!r}>, which {wanted}", "mend it")
+                raise tree.make_error(where, f"has <{element.tag} {key}={text[:40]!r}>, which {wanted}", "mend it")

@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from manitwin.geometry.poses import transform
-from manitwin.render.drawable import Drawable, drawable
+from manitwin.render.drawable import Drawable, prepare_drawable
 from manitwin.render.procedural_textures import TexturedBox, procedural_texture, textured_boxes
 from manitwin.render.scene_lighting import DirectionalLight, Lighting
 from manitwin.render.scene_renderer import SceneRenderer, Surroundings
@@ -43,7 +43,7 @@ def _box_drawable(box: SurfaceBox, variant: int) -> Drawable:
     boxes = [TexturedBox(np.array(box.half_extents_m), offset_m=offset_m)]
     if box.name == LEGGED:
         boxes += _legs(box)
-    return drawable([textured_boxes(boxes, procedural_texture(box.material, variant))])
+    return prepare_drawable([textured_boxes(boxes, procedural_texture(box.material, variant))])
 
 
 def _legs(table: SurfaceBox) -> list[TexturedBox]:
@@ -62,7 +62,7 @@ def _legs(table: SurfaceBox) -> list[TexturedBox]:
     ]
 
 
-def lighting_of(ambient: tuple[float, float, float], lights: Iterable[Light]) -> Lighting:
+def render_lighting(ambient: tuple[float, float, float], lights: Iterable[Light]) -> Lighting:
     """Return the lights of a scene's record as renderer lighting."""
     return Lighting(
         np.array(ambient),

@@ -9,9 +9,9 @@ import numpy as np
 
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody, StaticBox
+from manitwin.scenes.changed_twins import CurrentTwinStates, find_changed_twins
 from manitwin.scenes.scene import Furniture, SceneObject, SceneRecord
 from manitwin.scenes.scene_files import read_scene
-from manitwin.scenes.twins_now import StatesNow, changed_twins
 from manitwin.twin.loaded_twin import Twin, TwinSource
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Scene:
     @property
     def stale(self) -> str | None:
         """A line on twins that were rebuilt and rest differently now than in the scene; None if there are none."""
-        return changed_twins([self.record], StatesNow(self._source)).line
+        return find_changed_twins([self.record], CurrentTwinStates(self._source)).changed_remark
 
     def placed_objects(self) -> list[PlacedObject]:
         """Return the objects with their bodies, in the record's order; raises UsageError for a missing twin."""

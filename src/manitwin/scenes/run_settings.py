@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from manitwin.config import Section, read_toml, validated
+from manitwin.config import Section, read_toml, validate_settings
 from manitwin.engine.ledger.location import CONFIG, local_ledger
 from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
@@ -23,13 +23,13 @@ def load_settings(kind: type[Application], file: Path | None, given: dict[str, A
     line, and the key.
     """
     said = {} if file is None else read_toml(file)
-    validated(kind, said, str(file))
+    validate_settings(kind, said, str(file))
     for name, value in given.items():
         if isinstance(value, dict):
             said[name] = {**said.get(name, {}), **value}
         elif value is not None:
             said[name] = value
-    return validated(kind, said, "the command line")
+    return validate_settings(kind, said, "the command line")
 
 
 def earlier_settings(root: DatasetRoot) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
 from manitwin.formats.printable import printable_line
-from manitwin.formats.schema_version import is_newer, of_newer_schema
+from manitwin.formats.schema_version import is_newer, newer_schema_message
 from manitwin.scenes.scene import SCENE, SCENE_SCHEMA_VERSION, SCENE_SCHEMA_VERSIONS, SceneRecord
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, write_bytes_atomically
@@ -46,7 +46,7 @@ def parse_scene(content: bytes, path: str | Path = SCENE) -> SceneRecord:
     data = parse_json_object(content, str(path), UsageError, remedy="sample the layout again")
     version = data.get("schema_version")
     if is_newer(version, SCENE_SCHEMA_VERSION):
-        raise UsageError(of_newer_schema(path, version, SCENE_SCHEMA_VERSION))
+        raise UsageError(newer_schema_message(path, version, SCENE_SCHEMA_VERSION))
     if version not in SCENE_SCHEMA_VERSIONS or isinstance(version, bool):
         version = printable_line(str(version), max_characters=40)
         raise UsageError(
@@ -66,7 +66,7 @@ def scene_name(scene_id: str) -> str:
     return f"{SCENES}/{int(number) // 1000:04d}/{scene_id}"
 
 
-def scene_there(root: DatasetRoot, scene_id: str) -> bytes | None:
+def read_scene_content(root: DatasetRoot, scene_id: str) -> bytes | None:
     """Return the content of a scene's file in a run; None if it is missing or unreadable.
 
     Raises UsageError for a file that a newer version of this package wrote, which must not be replaced.
@@ -78,7 +78,7 @@ def scene_there(root: DatasetRoot, scene_id: str) -> bytes | None:
     except (FileNotFoundError, UsageError):
         return None
     if is_newer(version := said.get("schema_version"), SCENE_SCHEMA_VERSION):
-        raise UsageError(of_newer_schema(root.full(name), version, SCENE_SCHEMA_VERSION))
+        raise UsageError(newer_schema_message(root.full(name), version, SCENE_SCHEMA_VERSION))
     try:
         parse_scene(content, name)
     except UsageError:

@@ -31,7 +31,7 @@ from fsspec.implementations.local import LocalFileSystem
 from manitwin.errors import TwinError, UsageError
 from manitwin.formats.bounded_file import Refusal, read_bytes
 from manitwin.formats.json_file import MAX_JSON_BYTES, MEND, parse_json_object
-from manitwin.twin.store import RECORD, file_beside, replace_folder, write_bytes_atomically
+from manitwin.twin.store import RECORD, atomic_file, replace_folder, write_bytes_atomically
 
 TWINS = "twins"
 _PASSWORD = re.compile(r"://[^/@\s]*:[^/@\s]*@")
@@ -133,7 +133,7 @@ class DatasetRoot:
         if self.local is not None:
             place = Path(self.full(name))
             place.parent.mkdir(parents=True, exist_ok=True)
-            with file_beside(place) as beside:
+            with atomic_file(place) as beside:
                 shutil.copyfile(source, beside)
         else:
             self.fs.put_file(str(source), self.full(name))

@@ -34,7 +34,7 @@ class Filling(Record):
     center_of_mass_shift_m: Annotated[Finite, Field(ge=0, le=LARGEST_M)] | None = None
 
     @model_validator(mode="after")
-    def _possible(self) -> Filling:
+    def _check_states(self) -> Filling:
         """Reject states that are out of order or physically impossible."""
         for less, more in zip(self.states, self.states[1:], strict=False):
             if not (less.share < more.share and less.mass_kg < more.mass_kg):
@@ -46,6 +46,6 @@ class Filling(Record):
                 raise ValueError("filling: inertia_kg_m2 is larger than that of any object")
         return self
 
-    def at(self, share: float) -> FillState | None:
+    def state_at(self, share: float) -> FillState | None:
         """Return the state for a fill share; None if there is none."""
         return next((state for state in self.states if abs(state.share - share) < 1e-9), None)

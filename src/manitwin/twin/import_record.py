@@ -107,12 +107,12 @@ class ImportRecord(Record):
         return f"template:{self.name}" if self.format == TEMPLATE else f"imported:{self.format}"
 
     @property
-    def made_of_parts(self) -> bool:
+    def has_part_masses(self) -> bool:
         """Whether mass, centre of mass and inertia come from parts built with a material each."""
         return self.format in (TEMPLATE, FILLED)
 
     @property
-    def has_places(self) -> bool:
+    def has_annotated_poses(self) -> bool:
         """Whether the asset has points, grasps or resting poses, so that its orientation is intentional."""
         return bool(self.functional_points or self.grasp_points or self.grasps or self.rests) or self.format == "twin"
 
@@ -122,7 +122,7 @@ class ImportRecord(Record):
         return [what.removeprefix(MISSING_FILE) for what in self.missing if what.startswith(MISSING_FILE)]
 
     @property
-    def called(self) -> str:
+    def prior_key(self) -> str:
         """The object's category or name: the key to the priors."""
         return self.category or self.name
 
@@ -136,8 +136,8 @@ class ImportRecord(Record):
                 "asset_to_object": (transform @ np.array(self.asset_to_object)).tolist(),
                 "center_of_mass_m": None if center is None else center.tolist(),
                 "inertia_kg_m2": None if inertia is None else inertia.tolist(),
-                "functional_points": [_moved(point, transform) for point in self.functional_points],
-                "grasp_points": [_moved(point, transform) for point in self.grasp_points],
+                "functional_points": [_transform_point(point, transform) for point in self.functional_points],
+                "grasp_points": [_transform_point(point, transform) for point in self.grasp_points],
                 "grasps": [
                     grasps.model_copy(
                         update={
@@ -189,13 +189,13 @@ class ImportRecord(Record):
         )
 
 
-def _moved(point: GivenPoint, transform: np.ndarray) -> GivenPoint:
+def _transform_point(point: GivenPoint, transform: np.ndarray) -> GivenPoint:
     directions = {
         name: None if (value := getattr(point, name)) is None else (transform[:3, :3] @ value).tolist()
         for name in ("normal", "approach", "closing")
     }
     position = transform[:3, :3] @ point.position_m + transform[:3, 3]
-    frame = None if point.frame is None else _frame_moved(point.frame, transform)
+    frame = None if point.frame is None else _transform_frame(point.frame, transform)
     return point.model_copy(update={"position_m": position.tolist(), "frame": frame, **directions})
 
 
@@ -216,7 +216,7 @@ def read_import_record(path: Path) -> ImportRecord:
         raise UsageError(f"{path}: {where}: {first['msg']}; import the asset again") from error
 
 
-def _frame_moved(frame: FunctionalFrame, transform: np.ndarray) -> FunctionalFrame:
+def _transform_frame(frame: FunctionalFrame, transform: np.ndarray) -> FunctionalFrame:
     """Return a frame under a rigid transform ``(4, 4)`` of the object frame."""
     rotation = transform[:3, :3] @ rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz))
     position = transform[:3, :3] @ frame.position_m + transform[:3, 3]

@@ -44,7 +44,7 @@ class Joint(Record):
     velocity: Annotated[Finite, Field(ge=0)] | None = None
 
     @model_validator(mode="after")
-    def _possible(self) -> Joint:
+    def _check_limits(self) -> Joint:
         if abs(float(np.linalg.norm(self.axis)) - 1) > _UNIT_TOLERANCE:
             raise ValueError(f"the axis of joint {self.name!r} is not of length one")
         if (self.lower is None) != (self.upper is None) or (self.type == "continuous") != (
@@ -133,7 +133,7 @@ class Articulation(Record):
     link_of_mesh: list[Annotated[int, Field(ge=0)]]
 
     @model_validator(mode="after")
-    def _whole(self) -> Articulation:
+    def _check_tree(self) -> Articulation:
         require_tree([link.name for link in self.links], self.joints)
         if set(self.link_of_mesh) != set(range(len(self.links))):
             raise ValueError("each link has a mesh, and each mesh is of a link")
@@ -143,17 +143,19 @@ class Articulation(Record):
         """Return the links and joints under a rigid transform ``(4, 4)`` of their frame."""
         names = [link.name for link in self.links]
         joints = [Joint.of(joint.articulated(names).moved(transform), names) for joint in self.joints]
-        return self.model_copy(update={"joints": joints, "links": [_moved(link, transform) for link in self.links]})
+        return self.model_copy(
+            update={"joints": joints, "links": [_transform_link(link, transform) for link in self.links]}
+        )
 
     def scaled(self, factor: float) -> Articulation:
         """Return the links and joints with all lengths multiplied by ``factor`` and the same masses."""
         if factor == 1.0:
             return self
-        joints = [_joint_scaled(joint, factor) for joint in self.joints]
-        return self.model_copy(update={"joints": joints, "links": [_link_scaled(link, factor) for link in self.links]})
+        joints = [_scale_joint(joint, factor) for joint in self.joints]
+        return self.model_copy(update={"joints": joints, "links": [_scale_link(link, factor) for link in self.links]})
 
 
-def _moved(link: GivenLink, transform: np.ndarray) -> GivenLink:
+def _transform_link(link: GivenLink, transform: np.ndarray) -> GivenLink:
     if link.center_of_mass_m is None:
         return link
     rotation = transform[:3, :3]
@@ -176,7 +178,7 @@ def require_tree(links: Sequence[str], joints: Sequence[Joint]) -> None:
         raise ValueError(f"{len(links)} links are held by {len(links) - 1} joints, not by {len(joints)}")
 
 
-def _link_scaled(link: GivenLink, factor: float) -> GivenLink:
+def _scale_link(link: GivenLink, factor: float) -> GivenLink:
     if link.center_of_mass_m is None:
         return link
     said = link.inertia_kg_m2
@@ -185,7 +187,7 @@ def _link_scaled(link: GivenLink, factor: float) -> GivenLink:
     return link.model_copy(update={"center_of_mass_m": center, "inertia_kg_m2": inertia})
 
 
-def _joint_scaled(joint: Joint, factor: float) -> Joint:
+def _scale_joint(joint: Joint, factor: float) -> Joint:
     origin = (factor * np.array(joint.origin_m)).tolist()
     if joint.type != "prismatic":
         return joint.model_copy(update={"origin_m": origin})

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from manitwin.errors import TwinError, UsageError, choose_from
+from manitwin.errors import TwinError, UsageError, unknown_name_message
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.meshes.textures import bake_transform, make_part, material_of, normals_of, uv_of
 from manitwin.formats.npy_file import MAX_LABEL_BYTES, parse_labels
@@ -91,7 +91,7 @@ def posed_parts(
     for name, position in positions.items():
         if name not in names:
             raise UsageError(
-                choose_from("joint", name, names) if names else "the twin has no joints: it is one rigid body"
+                unknown_name_message("joint", name, names) if names else "the twin has no joints: it is one rigid body"
             )
         joint = joints[names.index(name)]
         if joint.within(position) != position:

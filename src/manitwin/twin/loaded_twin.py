@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 import trimesh
 
-from manitwin.errors import TwinError, UsageError, choose_from
+from manitwin.errors import TwinError, UsageError, unknown_name_message
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.npy_file import MAX_LABEL_BYTES, parse_labels
 from manitwin.geometry.articulation import ArticulatedBody
@@ -146,10 +146,10 @@ class Twin:
         filling = self.physical.filling
         if filling is None:
             raise UsageError(f"{self.folder}: has no fill states; only bottles, cans and jars have them")
-        state = filling.at(share)
+        state = filling.state_at(share)
         if state is None:
             valid = [f"{each.share:g}" for each in filling.states]
-            raise UsageError(f"{self.folder}: {choose_from('fill', f'{share:g}', valid)}")
+            raise UsageError(f"{self.folder}: {unknown_name_message('fill', f'{share:g}', valid)}")
         return state
 
     def grasp_table(self) -> pa.Table:
@@ -198,7 +198,7 @@ class Twin:
         if not tried:
             raise UsageError(f"{self.folder}: has no grasps for any gripper; build it again with a gripper")
         if name not in tried:
-            raise UsageError(f"{self.folder}: {choose_from('gripper', name, tried)}")
+            raise UsageError(f"{self.folder}: {unknown_name_message('gripper', name, tried)}")
         return name
 
     def add_to_sapien(self, scene: Any, pose: Any = None, *, visual: bool = True) -> Any:

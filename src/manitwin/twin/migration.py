@@ -8,7 +8,7 @@ from typing import Any
 SCHEMA_VERSION = 4
 
 
-def migrated(record: dict[str, Any]) -> dict[str, Any]:
+def migrate_record(record: dict[str, Any]) -> dict[str, Any]:
     """Return the content of a twin.json in the current schema version; content of an unknown version is returned unchanged.
 
     Values that an earlier version does not have are null or empty; nothing is computed.

@@ -53,7 +53,7 @@ class FunctionalFrame(Record):
     source: str = Field(min_length=1)
 
     @model_validator(mode="after")
-    def _is_a_rotation(self) -> FunctionalFrame:
+    def _check_quaternion(self) -> FunctionalFrame:
         length = sum(value * value for value in self.quaternion_wxyz) ** 0.5
         if abs(length - 1) > _UNIT_TOLERANCE:
             raise ValueError(f"quaternion_wxyz has length {length:g}, that of a rotation has 1")

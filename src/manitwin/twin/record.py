@@ -56,7 +56,7 @@ class Rejection(Record):
     detail: str
 
     @model_validator(mode="after")
-    def _known(self) -> Rejection:
+    def _check_reason(self) -> Rejection:
         if self.reason not in REJECTION_REASONS.get(self.stage, frozenset()):
             raise ValueError(f"stage {self.stage!r} has no rejection reason {self.reason!r}")
         return self
@@ -194,7 +194,7 @@ class Physical(Record):
     filling: Filling | None = None
 
     @model_validator(mode="after")
-    def _possible(self) -> Physical:
+    def _check_plausible(self) -> Physical:
         """Reject impossible values, such as negative masses or lengths that overflow in a simulator."""
         for name, estimate, largest in (
             ("mass_kg", self.mass_kg, LARGEST_KG),
@@ -279,7 +279,7 @@ class TwinRecord(Record):
     quality: Quality
 
     @model_validator(mode="after")
-    def _whole(self) -> TwinRecord:
+    def _check_consistent(self) -> TwinRecord:
         if (self.status == "rejected") != (self.rejection is not None):
             raise ValueError("a rejected twin has a rejection, an accepted one has none")
         missing = [

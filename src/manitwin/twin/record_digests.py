@@ -24,7 +24,7 @@ class TwinState:
     grippers: Mapping[str, str] = field(default_factory=dict)
 
 
-def state_of(record: Mapping[str, Any], name: str) -> TwinState:
+def twin_state(record: Mapping[str, Any], name: str) -> TwinState:
     """Return the state of a twin from its twin.json in the current schema version.
 
     Raises TwinError with ``name`` if a required value is missing.

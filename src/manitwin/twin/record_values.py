@@ -38,7 +38,7 @@ def _folder_name(name: str) -> str:
 FileBelow = Annotated[str, AfterValidator(_file_below)]
 
 
-def _turn(quaternion_wxyz: list[float]) -> list[float]:
+def _unit_quaternion(quaternion_wxyz: list[float]) -> list[float]:
     if not any(quaternion_wxyz):
         raise ValueError("a quaternion of zeros is no rotation")
     return quaternion_wxyz
@@ -48,7 +48,7 @@ FolderName = Annotated[str, AfterValidator(_folder_name)]
 Finite = Annotated[float, AfterValidator(_finite)]
 Vector3 = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Vector4 = Annotated[list[Finite], Field(min_length=4, max_length=4)]
-Quaternion = Annotated[Vector4, AfterValidator(_turn)]
+Quaternion = Annotated[Vector4, AfterValidator(_unit_quaternion)]
 Matrix3 = Annotated[list[Vector3], Field(min_length=3, max_length=3)]
 Matrix4 = Annotated[list[Vector4], Field(min_length=4, max_length=4)]
 Unit = Annotated[float, Field(ge=0, le=1)]
@@ -73,7 +73,7 @@ class Estimate(Record):
     source: str = Field(min_length=1)
 
     @model_validator(mode="after")
-    def _ordered(self) -> Estimate:
+    def _check_interval(self) -> Estimate:
         if not self.low <= self.value <= self.high:
             raise ValueError(f"{self.value} is outside [{self.low}, {self.high}]")
         return self

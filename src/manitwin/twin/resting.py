@@ -36,11 +36,11 @@ def resting_poses(placements: Sequence[Placement]) -> list[RestingPose]:
 
 def _resting_pose(number: int, placement: Placement) -> RestingPose:
     rotation = rotation_from_quaternion_wxyz(np.array(placement.quaternion_wxyz))
-    rest = rest_of(rotation)
+    rest = classify_rest(rotation)
     return RestingPose(number, placement, rest, side_down(rotation) if rest == "lying" else None, tilt_deg(rotation))
 
 
-def rest_of(object_to_plane: np.ndarray) -> Rest:
+def classify_rest(object_to_plane: np.ndarray) -> Rest:
     """Return how an object rests, from the rotation ``object_to_plane (3, 3)``."""
     cosine, limit = float(object_to_plane[2, 2]), np.cos(np.radians(UPRIGHT_DEG))
     if cosine > limit:

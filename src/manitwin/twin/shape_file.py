@@ -39,7 +39,7 @@ def surface(path: Path) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.vstack([part.vertices for part in parts]), np.vstack(faces), process=False)
 
 
-def shape_of(visual: Path) -> ShapeDescriptor:
+def compute_shape(visual: Path) -> ShapeDescriptor:
     """Compute the shape descriptor of a twin's ``visual.glb``. Raises TwinError."""
     try:
         return shape_descriptor(surface(visual), seed=_SEED)

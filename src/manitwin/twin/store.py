@@ -17,11 +17,11 @@ from manitwin.errors import NewerVersion, TwinError, UsageError
 from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
 from manitwin.formats.printable import printable, printable_line
-from manitwin.formats.schema_version import is_newer, of_newer_schema
-from manitwin.twin.migration import SCHEMA_VERSION, migrated
+from manitwin.formats.schema_version import is_newer, newer_schema_message
+from manitwin.twin.folder_check import require_regular_folder
+from manitwin.twin.migration import SCHEMA_VERSION, migrate_record
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.record_values import CONTROLS
-from manitwin.twin.twin_files import require_plain
 
 RECORD = "twin.json"
 RUN = "run.json"
@@ -78,12 +78,12 @@ def sha256_of_artifact(path: Path) -> str:
 
 def write_bytes_atomically(path: Path, content: bytes) -> None:
     """Write a file atomically: to a temporary file in the same folder, which is then renamed."""
-    with file_beside(path) as beside:
+    with atomic_file(path) as beside:
         beside.write_bytes(content)
 
 
 @contextmanager
-def file_beside(place: Path) -> Iterator[Path]:
+def atomic_file(place: Path) -> Iterator[Path]:
     """Yield a temporary path in the same folder; on success it replaces ``place``, on an exception it is removed.
 
     Raises UsageError if ``place`` is a folder.
@@ -102,7 +102,7 @@ def file_beside(place: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def folder_beside(place: Path) -> Iterator[Path]:
+def atomic_folder(place: Path) -> Iterator[Path]:
     """Yield an empty temporary folder beside ``place``; on success it replaces ``place``, on an exception it is removed."""
     beside = place.with_name(f".{place.name}.{os.getpid()}")
     shutil.rmtree(beside, ignore_errors=True)
@@ -134,29 +134,29 @@ def revision_of(record: dict[str, Any]) -> str:
     return sha256_of_json({key: value for key, value in record.items() if key != "revision"})
 
 
-def seal(folder: Path, record: dict[str, Any]) -> TwinRecord:
+def write_twin_record(folder: Path, record: dict[str, Any]) -> TwinRecord:
     """Add file digests and the revision to a record, validate it, and write twin.json.
 
     Raises pydantic.ValidationError if the record violates the schema, which is a bug.
     """
     digests = digests_below(folder)
     record = {**record, "files": {n: d for n, d in digests.items() if n not in (RECORD, RUN)}}
-    whole = _plain(TwinRecord(**record, revision="").model_dump(mode="json"))
+    whole = _escape_controls(TwinRecord(**record, revision="").model_dump(mode="json"))
     whole["revision"] = revision_of(whole)
     write_bytes_atomically(folder / RECORD, canonical_json(whole).encode())
     return TwinRecord(**whole)
 
 
-def _plain(value: Any) -> Any:
+def _escape_controls(value: Any) -> Any:
     """Return a JSON value with control characters in its texts escaped, as model answers and file names may contain them."""
     if isinstance(value, str):
         return CONTROLS.sub(lambda found: printable(found[0]), value)
     if isinstance(value, dict):
-        return {_plain(key): _plain(each) for key, each in value.items()}
-    return [_plain(each) for each in value] if isinstance(value, list) else value
+        return {_escape_controls(key): _escape_controls(each) for key, each in value.items()}
+    return [_escape_controls(each) for each in value] if isinstance(value, list) else value
 
 
-def _with_controls(value: Any) -> str | None:
+def _find_controls(value: Any) -> str | None:
     """Return an excerpt of a text in a JSON value that contains control characters; None if there is none."""
     left = [value]
     while left:
@@ -170,7 +170,7 @@ def _with_controls(value: Any) -> str | None:
     return None
 
 
-def amend(
+def replace_files(
     folder: Path, files: dict[str, bytes], note: Callable[[dict[str, int]], None] = lambda sizes: None
 ) -> TwinRecord:
     """Replace the content of some files of a finished twin; each is written atomically, twin.json last.
@@ -206,7 +206,7 @@ def read_record(folder: Path, verify: bool = False) -> TwinRecord:
                 "this is a data set: open it with `manitwin view` or manitwin.Dataset, or give a folder below twins/"
             )
         raise TwinError(f"{folder}: no {RECORD}, so this is not a finished twin; {remedy}")
-    require_plain(folder)
+    require_regular_folder(folder)
     content = read_bytes(path, MAX_JSON_BYTES, TwinError, inside=folder, name=str(path))
     record = parse_record(content, path)
     if verify:
@@ -220,8 +220,8 @@ def parse_record(content: bytes, path: str | Path = RECORD, *, sealed: bool = Fa
     A record of an earlier schema version is migrated; its ``revision`` stays that of the file.
     """
     said = parse_json_object(content, str(path), TwinError, remedy=REMEDY)
-    data = in_present_version(said, path)
-    if (found := _with_controls(data)) is not None:
+    data = migrate_content(said, path)
+    if (found := _find_controls(data)) is not None:
         raise TwinError(f"{path}: {printable_line(found)!r} contains control characters; {REMEDY}")
     if sealed and revision_of(said) != said.get("revision"):
         raise TwinError(f"{path}: altered since it was written (its revision does not match); {REMEDY}")
@@ -233,14 +233,14 @@ def parse_record(content: bytes, path: str | Path = RECORD, *, sealed: bool = Fa
         raise TwinError(f"{path}: {where}: {first['msg']}; {REMEDY}") from error
 
 
-def in_present_version(said: dict[str, Any], path: str | Path) -> dict[str, Any]:
+def migrate_content(said: dict[str, Any], path: str | Path) -> dict[str, Any]:
     """Return the content of a twin.json in the current schema version. Raises TwinError with ``path`` for an unknown version.
 
     A version newer than this package raises NewerVersion.
     """
-    data = migrated(said)
+    data = migrate_record(said)
     if is_newer(data.get("schema_version"), SCHEMA_VERSION):
-        raise NewerVersion(of_newer_schema(path, data["schema_version"], SCHEMA_VERSION))
+        raise NewerVersion(newer_schema_message(path, data["schema_version"], SCHEMA_VERSION))
     if data.get("schema_version") != SCHEMA_VERSION:
         version = printable_line(str(data.get("schema_version")), max_characters=_SHOWN_CHARACTERS)
         raise TwinError(f"{path}: schema version {version}, this package reads 1 to {SCHEMA_VERSION}; {REMEDY}")

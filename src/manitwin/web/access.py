@@ -55,7 +55,7 @@ HEADERS = {
 
 
 @dataclass(frozen=True)
-class Names:
+class ServerNames:
     """Names under which a server may be addressed: those of the local machine, and the requested host.
 
     ``open`` means that the server listens beyond this machine. It then also answers to any numeric IP address, which DNS
@@ -67,7 +67,7 @@ class Names:
     open: bool = False
 
     @classmethod
-    def of(cls, host: str, port: int) -> Names:
+    def of(cls, host: str, port: int) -> ServerNames:
         """Return the names of a server that listens on a host."""
         bare = host.strip("[]")
         try:
@@ -77,7 +77,7 @@ class Names:
         written = f"[{bare}]" if ":" in bare else bare
         return cls(frozenset({*LOOPBACK_NAMES, written.lower()}), port, open=not local)
 
-    def known(self, host: str) -> bool:
+    def is_known_host(self, host: str) -> bool:
         """Return whether a ``Host`` header is one of these names with the server's port."""
         try:
             parts = urlsplit(f"//{host}")
@@ -89,7 +89,7 @@ class Names:
         written = f"[{name}]" if ":" in name else name
         return written in self.hosts or (self.open and _is_address(name))
 
-    def own_origin(self, origin: str, host: str) -> bool:
+    def is_own_origin(self, origin: str, host: str) -> bool:
         """Return whether an ``Origin`` is that of this server's pages under the requested host name."""
         return origin.lower() == f"http://{host.lower()}"
 
@@ -105,7 +105,7 @@ def _is_address(name: str) -> bool:
 class Guard:
     """ASGI middleware that refuses requests as described in this module and adds ``HEADERS`` to every answer."""
 
-    def __init__(self, app: ASGIApp, names: Names, tokens: Tokens, used_link: Callable[[], None] | None = None):
+    def __init__(self, app: ASGIApp, names: ServerNames, tokens: Tokens, used_link: Callable[[], None] | None = None):
         self.app, self.names, self.tokens = app, names, tokens
         self.cookie = f"manitwin_{names.port}"  # cookies ignore ports: servers must not share one
         self._used_link = used_link
@@ -120,7 +120,7 @@ class Guard:
         headers = _Headers(scope)
         refused = self._refusal(scope, headers)
         if refused is None and scope["type"] == "http" and scope["path"] == ENTER:
-            await self._enter(scope, send)
+            await self._redeem_link(scope, send)
             return
         person = None if refused else self.tokens.person(_cookie(headers.all("cookie"), self.cookie))
         if refused is None and person is None:
@@ -133,19 +133,19 @@ class Guard:
 
     def _refusal(self, scope: Scope, headers: _Headers) -> str | None:
         hosts, origins = headers.all("host"), headers.all("origin")
-        if len(hosts) != 1 or not self.names.known(hosts[0]):
+        if len(hosts) != 1 or not self.names.is_known_host(hosts[0]):
             return "this server is not called so"
         reads = scope["type"] == "http" and scope["method"] in _READING
         if len(origins) > 1 or (not origins and not reads):
             return "asked by no page of this server"
-        if origins and not self.names.own_origin(origins[0], hosts[0]):
+        if origins and not self.names.is_own_origin(origins[0], hosts[0]):
             return "asked by a page of another site"
         foreign = headers.one("sec-fetch-site") in ("cross-site", "same-site")
         if foreign and headers.one("sec-fetch-mode") != "navigate":
             return "asked by a page of another site"
         return None
 
-    async def _enter(self, scope: Scope, send: Send) -> None:
+    async def _redeem_link(self, scope: Scope, send: Send) -> None:
         asked = parse_qs(scope["query_string"].decode("latin-1"))
         token, onward = asked.get("token", [""])[0], asked.get("next", ["/"])[0]
         secret = self.tokens.redeem(token) if scope["method"] == "GET" else None  # a preview (HEAD) keeps the link

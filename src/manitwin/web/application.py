@@ -42,15 +42,15 @@ def application(
         if gallery is None:
             assert twins.only is not None
             return RedirectResponse(LINKS.twin(twins.only.record.twin_id), 303)
-        return await answered(lambda: _gallery(gallery, dict(request.query_params), title))
+        return await run_or_message(lambda: _gallery(gallery, dict(request.query_params), title))
 
     async def show_twin(request: Request) -> Response:
         twin_id = request.path_params["twin_id"]
-        return await answered(lambda: _twin(twins, twin_id, gallery is not None))
+        return await run_or_message(lambda: _twin(twins, twin_id, gallery is not None))
 
     async def give_document(request: Request) -> Response:
         twin_id = request.path_params["twin_id"]
-        return await answered(
+        return await run_or_message(
             lambda: Response(
                 document_bytes(twin_document(twins.twin(twin_id))), media_type="application/json", headers=NOT_KEPT
             )
@@ -58,7 +58,7 @@ def application(
 
     async def give_trial(request: Request) -> Response:
         twin_id, asked = request.path_params["twin_id"], request.query_params
-        return await answered(
+        return await run_or_message(
             lambda: Response(
                 player.play(twins.twin(twin_id), asked.get("gripper", ""), asked.get("grasp", "")),
                 media_type="application/json",
@@ -68,7 +68,7 @@ def application(
 
     async def give_file(request: Request) -> Response:
         twin_id, name = request.path_params["twin_id"], request.path_params["name"]
-        return await answered(lambda: _FileResponse(open_file(twins.folder(twin_id), name)))
+        return await run_or_message(lambda: _FileResponse(open_file(twins.folder(twin_id), name)))
 
     return Starlette(
         routes=[
@@ -85,7 +85,7 @@ def application(
 async def _give_package_file(request: Request) -> Response:
     name = request.path_params["name"]
     if name not in KINDS:
-        return message(404, "There is no file of this name.")
+        return message_response(404, "There is no file of this name.")
     return Response(package_file(name), headers={"content-type": KINDS[name], "cache-control": "no-cache"})
 
 
@@ -93,22 +93,22 @@ PACKAGE_FILES = Route("/static/{name}", _give_package_file)
 """Styles and scripts of all pages."""
 
 
-async def answered(work: Callable[[], Response]) -> Response:
+async def run_or_message(work: Callable[[], Response]) -> Response:
     """Run ``work`` in a thread and return its response. Errors are shown as a message page, so that a broken twin affects only
     its page.
     """
     try:
         return await run_in_threadpool(work)
     except UsageError as error:
-        return message(404, str(error))
+        return message_response(404, str(error))
     except ManiTwinError as error:
-        return message(422, str(error))
+        return message_response(422, str(error))
 
 
 def _gallery(gallery: Gallery, asked: dict[str, str], title: str) -> Response:
     view = None
     try:
-        view = View.of(asked)
+        view = View.from_url_fields(asked)
         return HTMLResponse(gallery_page(gallery.find(view), title, LINKS), headers=NOT_KEPT)
     except UsageError as error:
         # For an invalid condition, show all twins, the error, and the fields as entered.
@@ -137,7 +137,7 @@ class _FileResponse(StreamingResponse):
             self._file.stream.close()
 
 
-def message(status: int, said: str) -> Response:
+def message_response(status: int, said: str) -> Response:
     """Return a page with a single message."""
     body = f'<main class="message"><p role="alert">{text(said)}</p><p><a href="{LINKS.gallery()}">The first page</a></p></main>\n'
     return HTMLResponse(page(str(status), body, LINKS), status, headers=NOT_KEPT)

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from manitwin.assets.audit.finding import Audited, RuleText
-from manitwin.assets.audit.report import count_by_severity, summary, unread_by_cause, worst_assets
+from manitwin.assets.audit.report import count_by_severity, summary, unreadable_by_cause, worst_assets
 from manitwin.dataset.report_page import Picture, Section, Table, page
 
 MOST_SHOWN = 24
@@ -32,7 +32,7 @@ def audit_page(audited: Sequence[Audited], rules: Sequence[RuleText], pictures: 
         " knowing. `manitwin audit --explain CODE` says more of a rule.",
     ]
     sections = [Section("By rule", [_by_rule(audited, rules)])]
-    unread = unread_by_cause(audited)
+    unread = unreadable_by_cause(audited)
     if unread:
         rows = [(cause, len(assets), assets[0]) for cause, assets in unread]
         sections.append(Section("Not read, or without geometry", [Table("By cause", ("cause", "assets", "as"), rows)]))

@@ -48,7 +48,7 @@ class CardTables:
             )
             self._connection.unregister("rows")
 
-    def counted(self, status: str, column: str) -> dict[str, int]:
+    def value_counts(self, status: str, column: str) -> dict[str, int]:
         """Return the number of rows per value of a column, most frequent first."""
         sql = f"SELECT {column}, count(*) FROM {status} WHERE {column} <> '' GROUP BY ALL ORDER BY ALL"
         found = [(str(value), int(count)) for value, count in self._connection.execute(sql).fetchall()]
@@ -56,7 +56,7 @@ class CardTables:
 
     def count(self, status: str, conditions: Sequence[str] = (), among: pa.Table | None = None) -> int:
         """Return the number of rows that satisfy all conditions; with ``among``, only of those twins (column ``twin_id``)."""
-        [(count,)] = self._asked(f"SELECT count(*) FROM {status} {_where(conditions, among)}", among)
+        [(count,)] = self._query(f"SELECT count(*) FROM {status} {_where(conditions, among)}", among)
         return int(count)
 
     def rows(
@@ -79,7 +79,7 @@ class CardTables:
         # Select row ids first and columns afterwards, so that only narrow rows are sorted.
         places = [
             place
-            for (place,) in self._asked(
+            for (place,) in self._query(
                 f"SELECT rowid FROM {status} {_where(conditions, among)} ORDER BY {by}rowid{some}", among
             )
         ]
@@ -91,7 +91,7 @@ class CardTables:
         found = {place: values for place, *values in self._connection.execute(sql).fetchall()}
         return [dict(zip(columns, found[place], strict=True)) for place in places]
 
-    def _asked(self, sql: str, among: pa.Table | None) -> list[tuple[Any, ...]]:
+    def _query(self, sql: str, among: pa.Table | None) -> list[tuple[Any, ...]]:
         if among is not None:
             self._connection.register(_CHOSEN, among)
         try:

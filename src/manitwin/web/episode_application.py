@@ -13,7 +13,7 @@ from starlette.types import ASGIApp
 from manitwin.episodes.attempts import OUTCOMES
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.robots.robot import Robot
-from manitwin.web.application import LINKS, NOT_KEPT, PACKAGE_FILES, answered, message
+from manitwin.web.application import LINKS, NOT_KEPT, PACKAGE_FILES, message_response, run_or_message
 from manitwin.web.attempt_rows import AttemptRow
 from manitwin.web.episode_document import DOCUMENT, episode_document
 from manitwin.web.episode_folders import EpisodeFolders
@@ -27,17 +27,17 @@ def episode_application(pages: ASGIApp, episodes: EpisodeFolders, title: str) ->
 
     async def show_list(request: Request) -> Response:
         asked = request.query_params
-        return await answered(lambda: _list(episodes, asked.get("from", "0"), asked.get("outcome", ""), title))
+        return await run_or_message(lambda: _list(episodes, asked.get("from", "0"), asked.get("outcome", ""), title))
 
     async def show_episode(request: Request) -> Response:
-        return await answered(lambda: _episode(episodes, _number(request)))
+        return await run_or_message(lambda: _episode(episodes, _number(request)))
 
     async def give_document(request: Request) -> Response:
-        return await answered(lambda: _document(episodes, _number(request)))
+        return await run_or_message(lambda: _document(episodes, _number(request)))
 
     async def give_robot(request: Request) -> Response:
         name, arm = request.path_params["name"], request.query_params.get("arm", "0")
-        return await answered(
+        return await run_or_message(
             lambda: Response(
                 robot_glb(_arm(episodes, name, arm).urdf), media_type="model/gltf-binary", headers=NOT_KEPT
             )
@@ -54,11 +54,11 @@ def episode_application(pages: ASGIApp, episodes: EpisodeFolders, title: str) ->
     )
 
 
-def no_twins(why: str) -> ASGIApp:
+def missing_twins_application(why: str) -> ASGIApp:
     """Return a substitute for the twin pages if the twins are not available: scripts, styles, and a message with the reason."""
 
     async def tell(request: Request) -> Response:
-        return message(404, why)
+        return message_response(404, why)
 
     return Starlette(routes=[PACKAGE_FILES, Route("/{path:path}", tell)])
 
@@ -86,7 +86,7 @@ def _list(episodes: EpisodeFolders, start: str, outcome: str, title: str) -> Res
     rows: list[AttemptRow | str]
     if episodes.attempts is None:
         numbers = range(place, min(place + PAGE_EPISODES, count))
-        rows = [_row(said, number) for said, number in zip(episodes.said_of(numbers), numbers, strict=True)]
+        rows = [_row(said, number) for said, number in zip(episodes.metadata_or_errors(numbers), numbers, strict=True)]
     else:
         rows = list(episodes.attempts.page(place, PAGE_EPISODES, outcome))
     shown = EpisodeList(

@@ -15,10 +15,10 @@ from manitwin.errors import EpisodesError, ManiTwinError
 from manitwin.formats.printable import printable_line
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.robots.robot import Robot
-from manitwin.web.episode_events import happenings, literals, phases, span_json
+from manitwin.web.episode_events import literals, phases, span_json, timeline_events
 from manitwin.web.episode_folders import EpisodeFolders
 from manitwin.web.links import Links
-from manitwin.web.robot_model import shown_links
+from manitwin.web.robot_model import links_with_visuals
 from manitwin.web.scene_document import furniture_boxes
 from manitwin.web.served_files import MODEL
 
@@ -47,13 +47,13 @@ def episode_document(episode: StoredEpisode, number: int, folders: EpisodeFolder
         raise EpisodesError(f"{len(episode.objects)} objects are more than the {MOST_OBJECTS} that are shown")
     try:
         found = folders.robot_of(episode.robot)
-        shown = [shown_links(arm.urdf) for arm in found.arms or (found,)]
+        shown = [links_with_visuals(arm.urdf) for arm in found.arms or (found,)]
         robot: Robot | None = found
     except ManiTwinError as error:
         robot, shown = None, []
         unreadable.append(str(error))
     objects, called = _objects(episode, folders, links, unreadable)
-    states = shown_states(recording, sum(map(len, shown)) + len(episode.objects) + episode.robot.arm_count)
+    states = sampled_states(recording, sum(map(len, shown)) + len(episode.objects) + episode.robot.arm_count)
     return {
         "episode_id": episode.attempt.episode_id,
         "number": number,
@@ -66,24 +66,24 @@ def episode_document(episode: StoredEpisode, number: int, folders: EpisodeFolder
         "target": recording.target,
         "tips": _tips(recording, states),
         "granules": _granules(episode, states, unreadable),
-        **_room(episode, unreadable),
+        **_room_description(episode, unreadable),
         "goal": _goal(episode),
         "hands": _hands(episode, states),
-        "sides": _sides(episode),
+        "sides": _force_labels(episode),
         "forces_n": [
-            [round(float(each), 2) for each in side] for side in _largest(recording.finger_forces_n, states).T
+            [round(float(each), 2) for each in side] for side in _interval_maxima(recording.finger_forces_n, states).T
         ],
         "phases": [span_json(each) for each in phases(recording)],
         "literals": [span_json(each) for each in literals(episode)],
         "happenings": [
             {"time_s": each.time_s, "kind": each.kind, "label": printable_line(each.label, max_characters=200)}
-            for each in happenings(episode, called)
+            for each in timeline_events(episode, called)
         ],
         "unreadable": [*unreadable, *([folders.without_twins] if folders.without_twins else [])],
     }
 
 
-def shown_states(recording: Recording, things: int) -> np.ndarray:
+def sampled_states(recording: Recording, things: int) -> np.ndarray:
     """Return the indices of the states in a document: all, or every n-th and the last, within its limits.
 
     ``things`` is the number of poses per state.
@@ -166,10 +166,10 @@ def _poses(positions_m: np.ndarray, quaternions_wxyz: np.ndarray) -> list[float]
     if not (np.abs(lengths - 1) < _LONGEST_QUATERNION).all():
         raise EpisodesError("a recorded rotation is none: its quaternion is not of length 1; write the episodes again")
     rows = np.round(np.hstack([positions_m, quaternions_wxyz]).astype(float), _DECIMALS)
-    return _plain(rows[:1] if (rows == rows[0]).all() else rows)
+    return _rounded_list(rows[:1] if (rows == rows[0]).all() else rows)
 
 
-def _plain(values: np.ndarray) -> list[float]:
+def _rounded_list(values: np.ndarray) -> list[float]:
     return [float(each) for each in np.round(np.asarray(values, float), _DECIMALS).ravel()]
 
 
@@ -183,10 +183,10 @@ def _granules(episode: StoredEpisode, states: np.ndarray, unreadable: list[str])
     if found is None or positions is None:
         return None
     chosen = np.arange(0, found[0], max(1, -(-found[0] // MOST_GRANULES)))
-    return {"radius_m": found[1], "count": len(chosen), "positions_m": _plain(positions[states][:, chosen])}
+    return {"radius_m": found[1], "count": len(chosen), "positions_m": _rounded_list(positions[states][:, chosen])}
 
 
-def _room(episode: StoredEpisode, unreadable: list[str]) -> dict[str, Any]:
+def _room_description(episode: StoredEpisode, unreadable: list[str]) -> dict[str, Any]:
     try:
         room: EpisodeRoom = episode_room(episode)
     except EpisodesError as error:
@@ -219,7 +219,7 @@ def _goal(episode: StoredEpisode) -> list[float] | None:
         or abs(np.linalg.det(pose[:3, :3]) - 1) > _LONGEST_QUATERNION
     ):
         return None
-    return _plain(np.append(pose[:3, 3], quaternion_wxyz(pose[:3, :3])))
+    return _rounded_list(np.append(pose[:3, 3], quaternion_wxyz(pose[:3, :3])))
 
 
 def _hands(episode: StoredEpisode, states: np.ndarray) -> list[dict[str, Any]]:
@@ -228,19 +228,20 @@ def _hands(episode: StoredEpisode, states: np.ndarray) -> list[dict[str, Any]]:
     called = [f"{arm.name}: opening" for arm in episode.robot.arms] or ["opening"]
     if episode.robot.has_jaws and len(called) == values.shape[1]:
         return [
-            {"name": name, "is_opening": True, "values": _plain(values[:, place])} for place, name in enumerate(called)
+            {"name": name, "is_opening": True, "values": _rounded_list(values[:, place])}
+            for place, name in enumerate(called)
         ]
     name = names[0] if len(names) == 1 else "mean of the hand's joints, rad"
-    return [{"name": name, "is_opening": False, "values": _plain(values.mean(axis=1))}]
+    return [{"name": name, "is_opening": False, "values": _rounded_list(values.mean(axis=1))}]
 
 
-def _sides(episode: StoredEpisode) -> list[str]:
+def _force_labels(episode: StoredEpisode) -> list[str]:
     """Return the label of each force curve."""
     words = ("force on the object, N", "from the other side")
     return [f"{arm.name}: {each}" for arm in episode.robot.arms for each in words] or list(words)
 
 
-def _largest(values: np.ndarray, states: np.ndarray) -> np.ndarray:
+def _interval_maxima(values: np.ndarray, states: np.ndarray) -> np.ndarray:
     """Return, for each of the given states, the maximum of ``values (T + 1, F)`` since the previous one."""
     starts = np.append(0, states[:-1] + 1)
     return np.asarray(np.maximum.reduceat(values, starts, axis=0))

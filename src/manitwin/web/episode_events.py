@@ -44,7 +44,7 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Happening:
+class TimelineEvent:
     """An event at a time of the recording in seconds."""
 
     time_s: float
@@ -92,11 +92,11 @@ def literals(episode: StoredEpisode) -> list[Span]:
 
 def goal_literals(goal: str | None) -> list[str]:
     """Return the literals of a goal expression, the whole text if it cannot be parsed, or nothing without a goal."""
-    found = [str(each) for each in _parsed(goal)]
+    found = [str(each) for each in _parse_literals(goal)]
     return found or ([printable_line(goal, max_characters=400)] if goal else [])
 
 
-def _parsed(goal: str | None) -> tuple[Literal, ...]:
+def _parse_literals(goal: str | None) -> tuple[Literal, ...]:
     if not goal:
         return ()
     try:
@@ -105,35 +105,35 @@ def _parsed(goal: str | None) -> tuple[Literal, ...]:
         return ()
 
 
-def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happening]:
+def timeline_events(episode: StoredEpisode, called: Callable[[str], str]) -> list[TimelineEvent]:
     """Return the events in order of time; ``called`` maps object names to display names.
 
     Raises EpisodesError if the recorded events are invalid.
     """
     recording, moved = episode.recording, [called(episode.objects[number].name) for number in handled_objects(episode)]
     rate, last = float(RATE_HZ), recording.steps
-    found: list[Happening] = []
+    found: list[TimelineEvent] = []
     for number, forces_n in enumerate(np.split(recording.finger_forces_n, episode.robot.arm_count, axis=1)):
         by = f" by the {episode.robot.arms[number].name}" if episode.robot.arms else ""
-        for first, end in _lasting(forces_n.min(axis=1) > HELD_N):
-            found.append(Happening(first / rate, "grasped", f"grasped {moved[first]}{by}"))
+        for first, end in _long_true_spans(forces_n.min(axis=1) > HELD_N):
+            found.append(TimelineEvent(first / rate, "grasped", f"grasped {moved[first]}{by}"))
             if end < last:
-                found.append(Happening((end + 1) / rate, "released", f"released {moved[first]}{by}"))
-    for first, end in _lasting(~recording.target_on_support.astype(bool)):
+                found.append(TimelineEvent((end + 1) / rate, "released", f"released {moved[first]}{by}"))
+    for first, end in _long_true_spans(~recording.target_on_support.astype(bool)):
         if first:
-            found.append(Happening(first / rate, "lifted", f"{moved[first]} leaves its support"))
+            found.append(TimelineEvent(first / rate, "lifted", f"{moved[first]} leaves its support"))
         if end < last:
-            found.append(Happening((end + 1) / rate, "set_down", f"{moved[first]} rests on a support"))
+            found.append(TimelineEvent((end + 1) / rate, "set_down", f"{moved[first]} rests on a support"))
     for first, _ in _spans(recording.unplanned_contact.astype(bool)):
-        found.append(Happening(first / rate, "contact", "the robot touched what it should not"))
-    found += _granules(episode, called) + _told(episode, called)
+        found.append(TimelineEvent(first / rate, "contact", "the robot touched what it should not"))
+    found += _granules(episode, called) + _recorded_events(episode, called)
     found += [
-        Happening(span.first / rate, "literal", f"now: {span.label}") for span in literals(episode)[1:]
+        TimelineEvent(span.first / rate, "literal", f"now: {span.label}") for span in literals(episode)[1:]
     ]  # the first literal begins with the episode
     return sorted(found, key=lambda each: each.time_s)[:MOST_EVENTS]
 
 
-def _granules(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happening]:
+def _granules(episode: StoredEpisode, called: Callable[[str], str]) -> list[TimelineEvent]:
     counts = episode.recording.granules_in_objects
     if counts is None:
         return []
@@ -143,14 +143,14 @@ def _granules(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happ
         more = np.flatnonzero(np.diff(held) > 0) + 1
         if len(more) and held.max() > held[0]:
             first, peak = int(more[0]), int(np.argmax(held))
-            found.append(Happening(first / RATE_HZ, "poured", f"the first granule in {called(thing.name)}"))
+            found.append(TimelineEvent(first / RATE_HZ, "poured", f"the first granule in {called(thing.name)}"))
             if peak > first:
                 said = f"{int(held[peak])} granules in {called(thing.name)}"
-                found.append(Happening(peak / RATE_HZ, "poured", said))
+                found.append(TimelineEvent(peak / RATE_HZ, "poured", said))
     return found
 
 
-def _told(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happening]:
+def _recorded_events(episode: StoredEpisode, called: Callable[[str], str]) -> list[TimelineEvent]:
     """Return the events recorded during the episode; those without a time are placed at its end."""
     try:
         events = _Events.model_validate(episode.facts).events
@@ -169,7 +169,7 @@ def _told(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happenin
         )
         label = f"{event.kind.replace('_', ' ')} {called(event.subject)}{second}{f' ({values})' if values else ''}"
         time_s = min(max(event.values.get("time_s", end_s), 0.0), end_s)
-        found.append(Happening(time_s, "told", label))
+        found.append(TimelineEvent(time_s, "told", label))
     return found
 
 
@@ -193,7 +193,7 @@ def _spans(true: np.ndarray) -> list[tuple[int, int]]:
     return found
 
 
-def _lasting(true: np.ndarray) -> list[tuple[int, int]]:
+def _long_true_spans(true: np.ndarray) -> list[tuple[int, int]]:
     """Return the intervals that are not short: an object that tips for an instant has not been lifted."""
     return [(start, end) for start, end in _spans(true) if end - start + 1 >= SHORT]
 

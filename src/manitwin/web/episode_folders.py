@@ -16,7 +16,7 @@ from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile
 from manitwin.episodes.hdf5_merge import TRAJECTORIES
-from manitwin.episodes.recording_arrays import checked
+from manitwin.episodes.recording_arrays import checked_recording
 from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode, recorded_robot
 from manitwin.errors import ConfigError, EpisodesError, ManiTwinError, UsageError
 from manitwin.formats.printable import printable_line
@@ -40,7 +40,7 @@ class _Place:
     problem: str | None = None
 
 
-def is_episodes(place: str) -> bool:
+def has_episodes(place: str) -> bool:
     """Return whether a place holds recorded episodes: a run of ``manitwin trajectories``, or an HDF5 file."""
     if "://" in place:
         return False
@@ -76,9 +76,9 @@ class EpisodeFolders:
         """Return an episode's data except arrays; raises UsageError for an unknown number, EpisodesError for a broken episode."""
         place = self._place(number)
         with EpisodeFile(place.file) as file:
-            return file.said(place.number)
+            return file.metadata(place.number)
 
-    def said_of(self, numbers: range) -> list[dict[str, Any] | str]:
+    def metadata_or_errors(self, numbers: range) -> list[dict[str, Any] | str]:
         """Return the same for several episodes, opening each file once; a broken episode gives its error message."""
         found: list[dict[str, Any] | str] = []
         for path, places in groupby((self._places[number] for number in numbers), key=lambda place: place.file):
@@ -87,7 +87,7 @@ class EpisodeFolders:
                 if told[0].problem is not None:
                     raise EpisodesError(told[0].problem)
                 with EpisodeFile(path) as file:
-                    found += [_said_or_why(file, place.number) for place in told]
+                    found += [_metadata_or_error(file, place.number) for place in told]
             except EpisodesError as error:
                 found += [str(error)] * len(told)
         return found
@@ -99,14 +99,14 @@ class EpisodeFolders:
         place = self._place(number)
         name = f"{place.file}: traj_{place.number}"
         with EpisodeFile(place.file) as file:
-            file.said(place.number)
+            file.metadata(place.number)
             size = file.content.size_bytes(f"traj_{place.number}")
             if size > MOST_EPISODE_BYTES:
                 raise EpisodesError(
                     f"{name}: {size:,} bytes of arrays, {MOST_EPISODE_BYTES:,} at most are shown; load the file itself"
                 )
             episode = file[place.number]
-        checked(episode)
+        checked_recording(episode)
         return episode
 
     def robot(self, name: str) -> Robot:
@@ -173,9 +173,9 @@ class EpisodeFolders:
         return rows, ""
 
 
-def _said_or_why(file: EpisodeFile, number: int) -> dict[str, Any] | str:
+def _metadata_or_error(file: EpisodeFile, number: int) -> dict[str, Any] | str:
     try:
-        return file.said(number)
+        return file.metadata(number)
     except EpisodesError as error:
         return str(error)
 
@@ -189,28 +189,28 @@ def _merged(folder: Path) -> Path | None:
 
 def _places(root: Path) -> list[_Place]:
     if root.is_file():
-        return _of_file(root)
+        return _episodes_of_file(root)
     merged = _merged(root)
     if merged is not None:
-        return _of_file(_inside(merged, root))
+        return _episodes_of_file(_check_inside(merged, root))
     files = sorted((root / BATCHES).glob(f"*/*/{EPISODES}"))
     with suppress(ManiTwinError):  # in the order of their attempts, if that can be read
         files = [folder / EPISODES for folder in batch_folders(root)]
     places: list[_Place] = []
     for file in files:
         try:
-            places += _of_file(_inside(file, root))
+            places += _episodes_of_file(_check_inside(file, root))
         except EpisodesError as error:  # a broken batch is one line in the list
             places.append(_Place(file, 0, str(error)))
     return places
 
 
-def _of_file(path: Path) -> list[_Place]:
+def _episodes_of_file(path: Path) -> list[_Place]:
     with EpisodeFile(path) as file:
         return [_Place(path, number) for number in range(len(file))]
 
 
-def _inside(file: Path, root: Path) -> Path:
+def _check_inside(file: Path, root: Path) -> Path:
     if not file.resolve().is_relative_to(root.resolve()):
         raise EpisodesError(f"{file}: leads out of the folder; put the file itself there")
     return file

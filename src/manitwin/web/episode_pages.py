@@ -68,7 +68,7 @@ class EpisodeList:
     outcomes: Mapping[str, int]
 
 
-class _Judged(BaseModel):
+class _LiteralResult(BaseModel):
     model_config = ConfigDict(extra="ignore")
 
     literal: str
@@ -77,7 +77,7 @@ class _Judged(BaseModel):
     measured: dict[str, float | str | None] = Field(default={}, max_length=64)
 
 
-_MEASURED = TypeAdapter(list[_Judged])
+_MEASURED = TypeAdapter(list[_LiteralResult])
 
 
 def recorded_row(said: dict[str, Any], number: int) -> AttemptRow:
@@ -182,7 +182,8 @@ def episode_page(
         f'<h1>{text(title)} <span class="{kind}">{text(attempt.outcome.replace("_", " "))}</span></h1>'
         f'<p class="caption">{text(asked)}</p></header>\n'
         f'<div class="twin">\n{_viewer(number, links)}'
-        f'<main id="main">\n{_judged(attempt)}{_instructions(attempt)}{_objects(said, links)}{_facts(attempt)}</main>\n</div>\n'
+        f'<main id="main">\n{_outcome_table(attempt)}{_instructions(attempt)}{_objects(said, links)}'
+        f"{_facts(attempt)}</main>\n</div>\n"
     )
     return page(title, body, links, scripts=[THREE, STAGE, EPISODE_TIMELINE, EPISODE_VIEWER], data=data)
 
@@ -210,7 +211,7 @@ def _viewer(number: int, links: Links) -> str:
     )
 
 
-def _judged(attempt: Attempt) -> str:
+def _outcome_table(attempt: Attempt) -> str:
     rows: list[tuple[str, Any]] = [
         (
             "outcome",

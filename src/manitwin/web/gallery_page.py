@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from manitwin.web.card_tables import WORDS
-from manitwin.web.gallery_query import SORTS, Found, View, decimal
+from manitwin.web.gallery_query import SORTS, GalleryPage, View, decimal
 from manitwin.web.html import GALLERY, number, options, page, text
 from manitwin.web.links import THUMBNAIL, Links
 
@@ -23,14 +23,14 @@ MOST_FACETS = 1_000
 """Maximum number of categories in the selection list; others can be searched by words."""
 
 
-def gallery_page(found: Found, title: str, links: Links, error: str = "", asked: View | None = None) -> str:
+def gallery_page(found: GalleryPage, title: str, links: Links, error: str = "", asked: View | None = None) -> str:
     """Return the page of a view. After an ``error``, the filters are those of the requested view ``asked``."""
     view = found.view
     body = (
         f"{_header(found, title, links)}"
         f'<div class="gallery">\n{_filters(found, view if asked is None else asked, links)}<main id="main">\n'
         + (f'<p class="error" role="alert">{text(error)}</p>\n' if error else "")
-        + f'<p class="count" role="status">{_said(found)}</p>\n'
+        + f'<p class="count" role="status">{_count_text(found)}</p>\n'
         + cards(found.rows, view.status, links)
         + _pages(found, links)
         + "</main>\n</div>\n"
@@ -38,7 +38,7 @@ def gallery_page(found: Found, title: str, links: Links, error: str = "", asked:
     return page(title, body, links, scripts=[GALLERY])
 
 
-def plain_gallery_page(rows: Sequence[dict[str, Any]], status: str, title: str, said: str, links: Links) -> str:
+def static_gallery_page(rows: Sequence[dict[str, Any]], status: str, title: str, said: str, links: Links) -> str:
     """Return a static gallery of given rows: all cards, and a text field that filters them."""
     body = (
         f'<header class="top"><h1>{text(title)}</h1></header>\n<main id="main" class="plain">\n'
@@ -80,7 +80,7 @@ def _facts(row: dict[str, Any]) -> list[tuple[str, str]]:
     return facts
 
 
-def _header(found: Found, title: str, links: Links) -> str:
+def _header(found: GalleryPage, title: str, links: Links) -> str:
     tabs = "".join(
         f'<a href="{text(links.gallery(View(status=status).query()))}"'
         f"{' aria-current=page' if status == found.view.status else ''}>{status} <b>{count:,}</b></a>"
@@ -89,13 +89,13 @@ def _header(found: Found, title: str, links: Links) -> str:
     return f'<header class="top"><h1>{text(title)}</h1><nav aria-label="Status">{tabs}</nav></header>\n'
 
 
-def _filters(found: Found, view: View, links: Links) -> str:
+def _filters(found: GalleryPage, view: View, links: Links) -> str:
     fields = [f'<label>Words <input type="search" name="q" value="{text(view.q)}"></label>']
     if view.status == "accepted":
         fields.append(_select("Category", "category", found.categories, view.category))
-        fields += [_between(said, low, high, view) for said, low, high in _BOUNDS]
-        fields.append(_least("Verified grasps, at least", "verified_min", view, "1"))
-        fields.append(_least("Robustness (median), at least", "robustness_min", view, "any"))
+        fields += [_range_filter(said, low, high, view) for said, low, high in _BOUNDS]
+        fields.append(_minimum_filter("Verified grasps, at least", "verified_min", view, "1"))
+        fields.append(_minimum_filter("Robustness (median), at least", "robustness_min", view, "any"))
     else:
         fields.append('<input type="hidden" name="status" value="rejected">')
         fields.append(_select("Stage", "stage", found.stages, view.stage))
@@ -122,7 +122,7 @@ def _select(said: str, name: str, counts: dict[str, int], chosen: str) -> str:
     return f'<label>{text(said)} <select name="{name}">{options(shown, chosen)}</select></label>'
 
 
-def _between(said: str, low: str, high: str, view: View) -> str:
+def _range_filter(said: str, low: str, high: str, view: View) -> str:
     return (
         f"<fieldset><legend>{text(said)}</legend>{_number(low, 'at least', view)} to "
         f"{_number(high, 'at most', view)}</fieldset>"
@@ -135,13 +135,13 @@ def _number(name: str, said: str, view: View) -> str:
     return f'<input type="number" step="any" min="0" name="{name}" aria-label="{said}" placeholder="{said}" value="{shown}">'
 
 
-def _least(said: str, name: str, view: View, step: str) -> str:
+def _minimum_filter(said: str, name: str, view: View, step: str) -> str:
     value = getattr(view, name)
     shown = "" if value is None else decimal(value)
     return f'<label>{text(said)} <input type="number" step="{step}" min="0" name="{name}" value="{shown}"></label>'
 
 
-def _said(found: Found) -> str:
+def _count_text(found: GalleryPage) -> str:
     every = found.counts[found.view.status]
     what = f"{found.total:,} of {every:,}" if found.total != every else f"{every:,}"
     return f"{what} {found.view.status} twins" + (
@@ -149,7 +149,7 @@ def _said(found: Found) -> str:
     )
 
 
-def _pages(found: Found, links: Links) -> str:
+def _pages(found: GalleryPage, links: Links) -> str:
     if found.pages == 1 and found.view.page == 1:
         return ""
     here, last = found.view.page, found.pages
@@ -158,12 +158,12 @@ def _pages(found: Found, links: Links) -> str:
     for each in numbers:
         gap = "<span>…</span>" if each > before + 1 else ""
         current = " aria-current=page" if each == here else ""
-        parts.append(f'{gap}<a href="{_at(found, links, each)}"{current}>{each:,}</a>')
+        parts.append(f'{gap}<a href="{_page_url(found, links, each)}"{current}>{each:,}</a>')
         before = each
-    previous = f'<a rel="prev" href="{_at(found, links, min(here - 1, last))}">Previous</a>' if here > 1 else ""
-    following = f'<a rel="next" href="{_at(found, links, here + 1)}">Next</a>' if here < last else ""
+    previous = f'<a rel="prev" href="{_page_url(found, links, min(here - 1, last))}">Previous</a>' if here > 1 else ""
+    following = f'<a rel="next" href="{_page_url(found, links, here + 1)}">Next</a>' if here < last else ""
     return f'<nav class="pages" aria-label="Pages">{previous}{"".join(parts)}{following}</nav>\n'
 
 
-def _at(found: Found, links: Links, number_: int) -> str:
+def _page_url(found: GalleryPage, links: Links, number_: int) -> str:
     return text(links.gallery(found.view.query(page=number_)))

@@ -15,7 +15,7 @@ import pyarrow as pa
 from manitwin.dataset.index.conditions import sql_text
 from manitwin.dataset.index.part_list import PARTS
 from manitwin.dataset.index.query import Index
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.web.card_tables import TABLES, WORDS, CardTables
 
@@ -71,22 +71,22 @@ class View:
     page: int = 1
 
     @classmethod
-    def of(cls, asked: Mapping[str, str]) -> View:
+    def from_url_fields(cls, asked: Mapping[str, str]) -> View:
         """Return the view of a URL's fields; raises UsageError for an unknown field or an invalid value."""
         given: dict[str, Any] = {}
         names = [each.name for each in fields(cls)]
         for name, value in asked.items():
             if name not in names:
-                raise UsageError(choose_from("filter", name, names))
+                raise UsageError(unknown_name_message("filter", name, names))
             if len(value) > LONGEST_TEXT:
                 raise UsageError(f"{name}: {len(value)} characters; give at most {LONGEST_TEXT}")
             if value.strip():
                 given[name] = _number(name, value) if name in _BOUNDS or name == "page" else value.strip()
         view = cls(**{**given, "page": int(given.get("page", 1))})
         if view.status not in TABLES:
-            raise UsageError(choose_from("status", view.status, TABLES))
+            raise UsageError(unknown_name_message("status", view.status, TABLES))
         if view.sort and view.sort not in SORTS[view.status]:
-            raise UsageError(choose_from("order", view.sort, SORTS[view.status]))
+            raise UsageError(unknown_name_message("order", view.sort, SORTS[view.status]))
         if not 1 <= view.page <= 10**6:
             raise UsageError(f"page is {view.page}; give 1 or more")
         return view
@@ -127,7 +127,7 @@ def _number(name: str, value: str) -> float:
 
 
 @dataclass(frozen=True)
-class Found:
+class GalleryPage:
     """The cards of one page, the total number, and the facets.
 
     ``counts`` is the number of twins per status; ``categories``, ``stages`` and ``reasons`` count their values, most frequent
@@ -158,12 +158,12 @@ class Gallery:
         self.root = root
         self._lock = threading.Lock()
         self._stamp: tuple[int, int] | None = None
-        self._opened()
+        self._open_tables()
 
-    def find(self, view: View) -> Found:
+    def find(self, view: View) -> GalleryPage:
         """Return a page of the view; raises UsageError for an invalid condition."""
         with self._lock:
-            cards, among = self._opened(), self._among(view)
+            cards, among = self._open_tables(), self._condition_twins(view)
             rows = cards.rows(
                 view.status,
                 view.conditions(),
@@ -172,30 +172,30 @@ class Gallery:
                 offset=PAGE_CARDS * (view.page - 1),
                 among=among,
             )
-            return Found(view, rows, cards.count(view.status, view.conditions(), among), **self._facets)
+            return GalleryPage(view, rows, cards.count(view.status, view.conditions(), among), **self._facets)
 
-    def chosen(self, view: View) -> list[dict[str, Any]]:
+    def all_rows(self, view: View) -> list[dict[str, Any]]:
         """Return all rows of the view with their searched words."""
         with self._lock:
-            cards, among = self._opened(), self._among(view)
+            cards, among = self._open_tables(), self._condition_twins(view)
             return cards.rows(view.status, view.conditions(), sort=view.sort, among=among, with_words=True)
 
-    def _among(self, view: View) -> pa.Table | None:
+    def _condition_twins(self, view: View) -> pa.Table | None:
         """Return the twins that satisfy the SQL condition, evaluated by the index, whose tables it may read; None without a
         condition.
         """
         return self._index.select(TABLES[view.status], view.where, columns=["twin_id"]) if view.where else None
 
-    def _opened(self) -> CardTables:
+    def _open_tables(self) -> CardTables:
         stamp = self._index_stamp()
         if self._stamp is None or stamp != self._stamp:
             self._index = Index(self.root, timeout_s=TIMEOUT_S, memory_gb=MEMORY_GB)
             self._cards = CardTables(self._index)
             self._facets: dict[str, Any] = {
                 "counts": {status: self._cards.count(status) for status in TABLES},
-                "categories": self._cards.counted("accepted", "category"),
-                "stages": self._cards.counted("rejected", "stage"),
-                "reasons": self._cards.counted("rejected", "reason"),
+                "categories": self._cards.value_counts("accepted", "category"),
+                "stages": self._cards.value_counts("rejected", "stage"),
+                "reasons": self._cards.value_counts("rejected", "reason"),
             }
             self._stamp = stamp
         return self._cards

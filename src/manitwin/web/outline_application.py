@@ -13,11 +13,11 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 
+from manitwin.dataset.review.object_statements import name_remark, read_name
 from manitwin.dataset.review.outlines import OutlineSession
-from manitwin.dataset.review.said_words import name_remark, read_name
 from manitwin.errors import ManiTwinError, UsageError
 from manitwin.formats.json_file import parse_json_object
-from manitwin.web.application import LINKS, NOT_KEPT, PACKAGE_FILES, answered
+from manitwin.web.application import LINKS, NOT_KEPT, PACKAGE_FILES, run_or_message
 from manitwin.web.outline_page import MASK, NAME_PATH, PATH, PICTURE, list_page, next_address, outline_page
 from manitwin.web.request_body import request_body
 
@@ -33,43 +33,47 @@ def outline_application(session: OutlineSession) -> Starlette:
     """Return the pages of a session without the access guard."""
 
     async def show_list(request: Request) -> Response:
-        return await answered(lambda: HTMLResponse(list_page(session, LINKS), headers=NOT_KEPT))
+        return await run_or_message(lambda: HTMLResponse(list_page(session, LINKS), headers=NOT_KEPT))
 
     async def show(request: Request) -> Response:
         key = request.path_params["key"]
-        return await answered(lambda: HTMLResponse(outline_page(session, session.photo(key), LINKS), headers=NOT_KEPT))
+        return await run_or_message(
+            lambda: HTMLResponse(outline_page(session, session.photo(key), LINKS), headers=NOT_KEPT)
+        )
 
     async def give_picture(request: Request) -> Response:
         key = request.path_params["key"]
-        return await answered(lambda: Response(session.picture(key), media_type="image/webp", headers=NOT_KEPT))
+        return await run_or_message(lambda: Response(session.picture(key), media_type="image/webp", headers=NOT_KEPT))
 
     async def give_mask(request: Request) -> Response:
         key = request.path_params["key"]
-        return await answered(lambda: Response(session.mask(key), media_type="image/png", headers=NOT_KEPT))
+        return await run_or_message(lambda: Response(session.mask(key), media_type="image/png", headers=NOT_KEPT))
 
     async def fit(request: Request) -> Response:
         key, png = request.path_params["key"], await request_body(request, MOST_BODY_BYTES)
-        return await _told(lambda: Response(session.fitted(key, png), media_type="image/png", headers=NOT_KEPT))
+        return await _json_response(
+            lambda: Response(session.snap_mask(key, png), media_type="image/png", headers=NOT_KEPT)
+        )
 
     async def keep(request: Request) -> Response:
         key, body = request.path_params["key"], await request_body(request, MOST_BODY_BYTES)
 
         def work() -> Response:
-            sent = _sent(body, SENT)
+            sent = _parse_body(body, SENT)
             png = None if sent["png"] is None else _png(sent["png"])
-            session.keep(key, png, sent["name"], sent["longest_side_cm"])
+            session.store_outline(key, png, sent["name"], sent["longest_side_cm"])
             return JSONResponse({"next": next_address(session, key), **vars(session.words(key))}, headers=NOT_KEPT)
 
-        return await _told(work)
+        return await _json_response(work)
 
     async def tell_name(request: Request) -> Response:
         body = await request_body(request, MOST_BODY_BYTES)
 
         def work() -> Response:
-            told = name_remark(read_name(_sent(body, ("name",))["name"]))
+            told = name_remark(read_name(_parse_body(body, ("name",))["name"]))
             return JSONResponse({"told": told}, headers=NOT_KEPT)
 
-        return await _told(work)
+        return await _json_response(work)
 
     return Starlette(
         routes=[
@@ -85,7 +89,7 @@ def outline_application(session: OutlineSession) -> Starlette:
     )
 
 
-def _sent(body: bytes, names: tuple[str, ...]) -> dict[str, Any]:
+def _parse_body(body: bytes, names: tuple[str, ...]) -> dict[str, Any]:
     """Return the body as an object; raises UsageError unless it has exactly these names."""
     sent = parse_json_object(body, "what was sent", UsageError, remedy="reload the page")
     if set(sent) != set(names):
@@ -100,7 +104,7 @@ def _png(said: object) -> bytes:
         raise UsageError("what was sent is no outline in base64; reload the page") from error
 
 
-async def _told(work: Callable[[], Response]) -> Response:
+async def _json_response(work: Callable[[], Response]) -> Response:
     """Run ``work`` in a thread and answer a script's request; errors are returned as JSON."""
     try:
         return await run_in_threadpool(work)

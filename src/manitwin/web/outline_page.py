@@ -5,8 +5,8 @@ from __future__ import annotations
 from urllib.parse import quote
 
 from manitwin.dataset.review.cutouts import DoubtedPhoto
+from manitwin.dataset.review.object_statements import ObjectStatement, known_names, name_remark
 from manitwin.dataset.review.outlines import OutlineSession
-from manitwin.dataset.review.said_words import Words, known_names, name_remark
 from manitwin.pipeline.manifest_item import LONGEST
 from manitwin.web.html import OUTLINE, page, text
 from manitwin.web.links import Links
@@ -49,7 +49,7 @@ def next_address(session: OutlineSession, key: str) -> str:
     """Return the page of the next photo without an outline, wrapping around; the list if none is left."""
     keys = list(session.photos)
     at = keys.index(key)
-    left = [each for each in (*keys[at + 1 :], *keys[:at]) if each not in session.kept]
+    left = [each for each in (*keys[at + 1 :], *keys[:at]) if each not in session.outlined_keys]
     return address_of(left[0]) if left else "/"
 
 
@@ -57,11 +57,11 @@ def list_page(session: OutlineSession, links: Links) -> str:
     """Return the list of all doubted photos of a data set."""
     cards = "".join(
         f'<li class="card"><a href="{address_of(key)}"><img src="{address_of(key, PICTURE)}" alt="" loading="lazy">'
-        f'<span class="name">{text(_called(session, key))}</span><p class="under">'
+        f'<span class="name">{text(_photo_name(session, key))}</span><p class="under">'
         f"{text(_state(session, photo))}</p></a></li>\n"
         for key, photo in session.photos.items()
     )
-    left = len(session.photos) - len(session.kept)
+    left = len(session.photos) - len(session.outlined_keys)
     body = (
         f"{_head(session)}"
         f'<main id="main"><ul class="cards find">\n{cards}</ul>\n'
@@ -106,11 +106,12 @@ def outline_page(session: OutlineSession, photo: DoubtedPhoto, links: Links) -> 
 def _head(session: OutlineSession) -> str:
     return (
         f'<header class="top"><h1>Outlines</h1><nav><a href="/">all photos</a></nav><p class="caption" id="progress">'
-        f"{text(session.annotator)}: {len(session.kept)} drawn, {len(session.photos) - len(session.kept)} left</p></header>\n"
+        f"{text(session.annotator)}: {len(session.outlined_keys)} drawn, "
+        f"{len(session.photos) - len(session.outlined_keys)} left</p></header>\n"
     )
 
 
-def _fields(words: Words) -> str:
+def _fields(words: ObjectStatement) -> str:
     """Return the input fields for name and length, in the order and with the keys of ``FIELDS``."""
     more = {
         "name": f'list="names" maxlength="{LONGEST["name"]}" placeholder="what it is"',
@@ -128,7 +129,7 @@ def _fields(words: Words) -> str:
     )
 
 
-def _called(session: OutlineSession, key: str) -> str:
+def _photo_name(session: OutlineSession, key: str) -> str:
     name, title = session.words(key).name, session.photos[key].title
     return f"{title}: {name}" if name else title
 
@@ -137,8 +138,8 @@ def _state(session: OutlineSession, photo: DoubtedPhoto) -> str:
     done = [
         word
         for word, is_done in (
-            ("drawn", photo.key in session.kept),
-            ("named or measured", photo.twin_id in session.said),
+            ("drawn", photo.key in session.outlined_keys),
+            ("named or measured", photo.twin_id in session.restated_twins),
         )
         if is_done
     ]

@@ -19,7 +19,7 @@ from manitwin.formats.json_file import parse_json_object
 from manitwin.twin.loaded_twin import Twin
 from manitwin.web import trial_document
 from manitwin.web.access import PERSON
-from manitwin.web.application import LINKS, message
+from manitwin.web.application import LINKS, message_response
 from manitwin.web.request_body import request_body
 from manitwin.web.review_page import PATH, done_page, review_page
 from manitwin.web.served_files import INPUTS, VIEWS, TwinFolders
@@ -34,11 +34,13 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
     """Return the pages of a review, falling back to ``pages`` of the twins; in a blind review only their pictures and shapes."""
 
     async def onward(request: Request) -> Response:
-        return await _answered(lambda: _onward(session, twins, _person(request), request.query_params.get("after")))
+        return await _run_or_error(
+            lambda: _redirect_to_next_twin(session, twins, _person(request), request.query_params.get("after"))
+        )
 
     async def show(request: Request) -> Response:
         person, twin_id = _person(request), request.path_params["twin_id"]
-        return await _answered(lambda: _page(session, twins.twin(twin_id), person))
+        return await _run_or_error(lambda: _page(session, twins.twin(twin_id), person))
 
     async def confirm(request: Request) -> Response:
         person, twin_id, body = (
@@ -48,10 +50,10 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
         )
 
         def work() -> Response:
-            session.confirm(person, _accepted(twins.twin(twin_id)).record, _said(body, "review", person))
+            session.confirm(person, _require_accepted(twins.twin(twin_id)).record, _parse_body(body, "review", person))
             return JSONResponse({"next": PATH}, headers=_NOT_KEPT)
 
-        return await _answered(work, as_json=True)
+        return await _run_or_error(work, as_json=True)
 
     async def draft(request: Request) -> Response:
         person, twin_id, body = (
@@ -61,21 +63,21 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
         )
 
         def work() -> Response:
-            said = _said(body, "draft", person)
-            session.store.put_draft(person, _accepted(twins.twin(twin_id)).record.twin_id, said)
+            said = _parse_body(body, "draft", person)
+            session.store.put_draft(person, _require_accepted(twins.twin(twin_id)).record.twin_id, said)
             return JSONResponse({}, headers=_NOT_KEPT)
 
-        return await _answered(work, as_json=True)
+        return await _run_or_error(work, as_json=True)
 
     async def undo(request: Request) -> Response:
         person, body = _person(request), await request_body(request, MOST_BODY_BYTES)
 
         def work() -> Response:
-            undone = session.undo(person, str(_said(body, "undo", person).get("request", "")))
+            undone = session.undo(person, str(_parse_body(body, "undo", person).get("request", "")))
             twin_id = None if undone is None else quote(undone.review.twin_id, safe="")
             return JSONResponse({"next": None if twin_id is None else f"{PATH}/{twin_id}"}, headers=_NOT_KEPT)
 
-        return await _answered(work, as_json=True)
+        return await _run_or_error(work, as_json=True)
 
     return Starlette(
         routes=[
@@ -85,12 +87,12 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
             Route(f"{PATH}/{{twin_id}}", show),
             Route(f"{PATH}/{{twin_id}}", confirm, methods=["POST"]),
             Route(f"{PATH}/{{twin_id}}/draft", draft, methods=["POST"]),
-            Mount("/", _Blind(pages) if session.blind else pages),
+            Mount("/", _BlindReviewFilter(pages) if session.blind else pages),
         ]
     )
 
 
-class _Blind:
+class _BlindReviewFilter:
     """Serves shapes and pictures only, and hides pages and records with the origin and confidence of annotations."""
 
     def __init__(self, pages: ASGIApp):
@@ -109,13 +111,13 @@ def _person(request: Request) -> str:
     return str(request.scope.get(PERSON) or "")
 
 
-def _onward(session: ReviewSession, twins: TwinFolders, person: str, after: str | None) -> Response:
+def _redirect_to_next_twin(session: ReviewSession, twins: TwinFolders, person: str, after: str | None) -> Response:
     """Redirect to the first readable twin of the queue, so that an unreadable one does not block the others."""
     _require_known(session, person)
     unread: dict[str, str] = {}
     for twin_id in session.queue(person, after):
         try:
-            _accepted(twins.twin(twin_id))
+            _require_accepted(twins.twin(twin_id))
         except ManiTwinError as error:
             unread[twin_id] = str(error)
             continue
@@ -125,7 +127,7 @@ def _onward(session: ReviewSession, twins: TwinFolders, person: str, after: str 
 
 def _page(session: ReviewSession, twin: Twin, person: str) -> Response:
     _require_known(session, person)
-    twin_id = _accepted(twin).record.twin_id
+    twin_id = _require_accepted(twin).record.twin_id
     draft = session.store.draft(person, twin_id)
     if draft is None:
         stored = session.store.of_twin(twin_id, person)
@@ -136,7 +138,7 @@ def _page(session: ReviewSession, twin: Twin, person: str) -> Response:
     return HTMLResponse(page, headers=_NOT_KEPT)
 
 
-def _accepted(twin: Twin) -> Twin:
+def _require_accepted(twin: Twin) -> Twin:
     if twin.record.status != "accepted":
         raise UsageError(f"{twin.record.twin_id} was rejected, and only accepted twins are reviewed")
     return twin
@@ -147,7 +149,7 @@ def _require_known(session: ReviewSession, person: str) -> None:
         raise UsageError("this link is nobody's who reviews; open the one with your name")
 
 
-def _said(body: bytes, what: str, person: str) -> dict[str, Any]:
+def _parse_body(body: bytes, what: str, person: str) -> dict[str, Any]:
     """Return the body as an object; raises UsageError if it belongs to another annotator than the browser's cookie."""
     said = parse_json_object(body, what, UsageError)
     if said.pop("annotator", person) != person:
@@ -157,7 +159,7 @@ def _said(body: bytes, what: str, person: str) -> dict[str, Any]:
     return said
 
 
-async def _answered(work: Callable[[], Response], *, as_json: bool = False) -> Response:
+async def _run_or_error(work: Callable[[], Response], *, as_json: bool = False) -> Response:
     """Run ``work`` in a thread and return its response; errors are returned as text or JSON."""
     try:
         return await run_in_threadpool(work)
@@ -166,4 +168,4 @@ async def _answered(work: Callable[[], Response], *, as_json: bool = False) -> R
         status = 400 if isinstance(error, UsageError) else 422
         if as_json:
             return JSONResponse(said, status, headers=_NOT_KEPT)
-        return message(status, str(error))
+        return message_response(status, str(error))

@@ -6,8 +6,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from manitwin.dataset.review.review_subjects import annotation_text
 from manitwin.dataset.review.session import Progress
-from manitwin.dataset.review.twins_seen import said_of
 from manitwin.dataset.review.verdicts import ANSWERS, DIMENSIONS, MOST_NAME_CHARACTERS, MOST_NOTE_CHARACTERS, Dimension
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record import TwinRecord
@@ -106,12 +106,13 @@ def _dimension(record: TwinRecord, place: int, dimension: Dimension, blind: bool
     return (
         f'<fieldset data-dimension="{dimension}"><legend><kbd>{place}</kbd> {dimension}'
         f' <span class="question">{text(QUESTIONS[dimension])}</span></legend>\n'
-        f'<p class="given">{text(said_of(record, dimension, blind=blind))}</p>\n'
-        f'<div class="answers" role="radiogroup" aria-label="{dimension}">{answers}</div>{_fix(record, dimension)}</fieldset>\n'
+        f'<p class="given">{text(annotation_text(record, dimension, blind=blind))}</p>\n'
+        f'<div class="answers" role="radiogroup" aria-label="{dimension}">{answers}</div>'
+        f"{_correction_fields(record, dimension)}</fieldset>\n"
     )
 
 
-def _fix(record: TwinRecord, dimension: Dimension) -> str:
+def _correction_fields(record: TwinRecord, dimension: Dimension) -> str:
     physical, points = record.physical, record.points
     if dimension == "category":
         return _hidden(f'<label>it is <input data-fix="category" maxlength="{MOST_NAME_CHARACTERS}"></label>')

@@ -8,10 +8,10 @@ from functools import lru_cache
 import numpy as np
 import trimesh
 
-from manitwin.episodes.robot_looks import link_visuals
+from manitwin.episodes.robot_appearance import link_visuals
 from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.shading_normals import with_creased_normals
 from manitwin.formats.meshes.textures import make_part, material_of, pbr_material
-from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.repair.welding import weld_equal
 from manitwin.render.simplification import simplified
 
@@ -19,7 +19,7 @@ TOLERANCE_M = 0.0015
 """Maximum deviation of simplified surfaces: about a pixel if a whole arm fills 1,000 pixels."""
 
 
-def shown_links(urdf: str) -> list[str]:
+def links_with_visuals(urdf: str) -> list[str]:
     """Return the names of the links with visual meshes, in the order of their numbers in the GLB; raises AssetError."""
     return list(link_visuals(urdf))
 
@@ -33,11 +33,11 @@ def robot_glb(urdf: str) -> bytes:
     """
     parts = []
     for number, visuals in enumerate(link_visuals(urdf).values()):
-        parts += [_named(part, f"l{number}p{place}") for place, part in enumerate(_by_look(visuals))]
+        parts += [_set_name(part, f"l{number}p{place}") for place, part in enumerate(_merge_by_material(visuals))]
     return write_glb(parts)
 
 
-def _by_look(visuals: Iterable[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
+def _merge_by_material(visuals: Iterable[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
     """Return parts merged by colour, metallic and roughness, with simplified geometry."""
     alike: dict[tuple[float, ...], list[trimesh.Trimesh]] = {}
     for each in visuals:
@@ -60,6 +60,6 @@ def _simplified(parts: list[trimesh.Trimesh], look: tuple[float, ...]) -> trimes
     return with_creased_normals(make_part(vertices[used], faces.reshape(-1, 3), material=material, name="links"))
 
 
-def _named(part: trimesh.Trimesh, name: str) -> trimesh.Trimesh:
+def _set_name(part: trimesh.Trimesh, name: str) -> trimesh.Trimesh:
     part.metadata["name"] = name
     return part

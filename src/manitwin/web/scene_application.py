@@ -10,7 +10,7 @@ from starlette.types import ASGIApp
 
 from manitwin.errors import UsageError
 from manitwin.scenes.scene import SceneRecord
-from manitwin.web.application import LINKS, NOT_KEPT, answered
+from manitwin.web.application import LINKS, NOT_KEPT, run_or_message
 from manitwin.web.scene_document import DOCUMENT, scene_document
 from manitwin.web.scene_folders import SceneFolders
 from manitwin.web.scene_pages import PAGE_SCENES, list_page, scene_page
@@ -23,15 +23,15 @@ def scene_application(pages: ASGIApp, scenes: SceneFolders, title: str) -> Starl
     async def show_list(request: Request) -> Response:
         if len(scenes.ids) == 1:
             return RedirectResponse(LINKS.scene(scenes.ids[0]), 303)
-        return await answered(lambda: _list(scenes, request.query_params.get("from", "0"), title))
+        return await run_or_message(lambda: _list(scenes, request.query_params.get("from", "0"), title))
 
     async def show_scene(request: Request) -> Response:
         scene_id = request.path_params["scene_id"]
-        return await answered(lambda: _scene(scenes, scene_id))
+        return await run_or_message(lambda: _scene(scenes, scene_id))
 
     async def give_document(request: Request) -> Response:
         scene_id = request.path_params["scene_id"]
-        return await answered(
+        return await run_or_message(
             lambda: Response(
                 document_bytes(scene_document(scenes.scene(scene_id), scenes.twins, LINKS)),
                 media_type="application/json",
@@ -66,4 +66,4 @@ def _read(scenes: SceneFolders, scene_id: str) -> SceneRecord | str:
 
 def _scene(scenes: SceneFolders, scene_id: str) -> Response:
     record = scenes.scene(scene_id)
-    return HTMLResponse(scene_page(record, LINKS, *scenes.beside(scene_id)), headers=NOT_KEPT)
+    return HTMLResponse(scene_page(record, LINKS, *scenes.neighbours(scene_id)), headers=NOT_KEPT)

@@ -10,7 +10,7 @@ from manitwin.scenes.scene_files import dataset_of, read_scene, scene_files
 from manitwin.web.served_files import TwinFolders
 
 
-def is_scenes(place: str) -> bool:
+def has_scenes(place: str) -> bool:
     """Return whether a place holds scenes: a run of ``manitwin layout``, a scene's folder or its file."""
     return "://" not in place and bool(scene_files(Path(place)))
 
@@ -36,7 +36,7 @@ class SceneFolders:
             raise UsageError("there is no scene of this name")
         return read_scene(self._files[scene_id])
 
-    def beside(self, scene_id: str) -> tuple[str | None, str | None]:
+    def neighbours(self, scene_id: str) -> tuple[str | None, str | None]:
         """Return the ids of the previous and the next scene; None at the ends."""
         at = self.ids.index(scene_id)
         return (self.ids[at - 1] if at else None), (self.ids[at + 1] if at + 1 < len(self.ids) else None)

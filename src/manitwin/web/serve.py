@@ -19,15 +19,15 @@ from manitwin.dataset.review.outlines import OutlineSession
 from manitwin.dataset.review.session import ReviewSession
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.web.access import ENTER, Guard, Names
+from manitwin.web.access import ENTER, Guard, ServerNames
 from manitwin.web.application import application
-from manitwin.web.episode_application import episode_application, no_twins
-from manitwin.web.episode_folders import EpisodeFolders, is_episodes
+from manitwin.web.episode_application import episode_application, missing_twins_application
+from manitwin.web.episode_folders import EpisodeFolders, has_episodes
 from manitwin.web.gallery_query import Gallery
 from manitwin.web.outline_application import outline_application
 from manitwin.web.review_application import review_application
 from manitwin.web.scene_application import scene_application
-from manitwin.web.scene_folders import SceneFolders, is_scenes
+from manitwin.web.scene_folders import SceneFolders, has_scenes
 from manitwin.web.served_files import TwinFolders
 from manitwin.web.tokens import Tokens
 from manitwin.web.trial_player import TrialPlayer
@@ -67,13 +67,13 @@ def bound_socket(host: str, port: int) -> socket.socket:
     return bound
 
 
-def _is_no_end_of_waiting(record: logging.LogRecord) -> bool:
+def _is_not_shutdown_message(record: logging.LogRecord) -> bool:
     """Drop uvicorn's messages about requests that are cancelled at shutdown, which is intended."""
     cancelled = record.exc_info is not None and isinstance(record.exc_info[1], asyncio.CancelledError)
     return not cancelled and not str(record.msg).startswith("Cancel %s running task(s)")
 
 
-logging.getLogger("uvicorn.error").addFilter(_is_no_end_of_waiting)
+logging.getLogger("uvicorn.error").addFilter(_is_not_shutdown_message)
 
 
 class _Server(uvicorn.Server):
@@ -101,13 +101,13 @@ class PageServer:
     ):
         self.tokens = Tokens() if tokens is None else tokens
         self.socket = (
-            bound_socket(host, port) if port or not self.tokens.port else self._as_before(host, self.tokens.port)
+            bound_socket(host, port) if port or not self.tokens.port else self._rebind_socket(host, self.tokens.port)
         )
         self.host, self.port = host.strip("[]"), int(self.socket.getsockname()[1])
-        self.names = Names.of(host, self.port)
-        self.tokens.served_at(self.port)
+        self.names = ServerNames.of(host, self.port)
+        self.tokens.record_port(self.port)
         self._on_new_link, self._told = on_new_link, float("-inf")
-        guard = Guard(app, self.names, self.tokens, self._used)
+        guard = Guard(app, self.names, self.tokens, self._replace_used_link)
         # Requests are not logged: their URLs contain tokens.
         config = uvicorn.Config(
             guard, log_config=None, access_log=False, lifespan="off", server_header=False, limit_concurrency=MOST_REQUESTS,
@@ -116,7 +116,7 @@ class PageServer:
         self._server = _Server(config)
 
     @staticmethod
-    def _as_before(host: str, port: int) -> socket.socket:
+    def _rebind_socket(host: str, port: int) -> socket.socket:
         try:
             return bound_socket(host, port)
         except UsageError:  # another program uses it now
@@ -139,27 +139,29 @@ class PageServer:
         """Stop serving."""
         self._server.should_exit = True
 
-    def _used(self) -> None:
+    def _replace_used_link(self) -> None:
         now = asyncio.get_running_loop().time()
         if self._on_new_link is not None and now - self._told >= BETWEEN_LINKS_S:
             self._told = now
             self._on_new_link(self.link())
 
 
-def pages_of(place: str, cache: Path, twins: str | None = None, trials: TrialPlayer | None = None) -> ASGIApp:
+def application_for_place(
+    place: str, cache: Path, twins: str | None = None, trials: TrialPlayer | None = None
+) -> ASGIApp:
     """Return the pages of a data set, a twin's folder, scenes, or episodes whose twins are in the data set ``twins``.
 
     Raises UsageError for any other place or a missing index, and EpisodesError for an episode file that cannot be read.
     """
-    if is_episodes(place):
+    if has_episodes(place):
         episodes = EpisodeFolders(place, cache, twins)
         title = Path(place).resolve().name
         if episodes.twins is None:
-            return episode_application(no_twins(episodes.without_twins), episodes, title)
+            return episode_application(missing_twins_application(episodes.without_twins), episodes, title)
         return episode_application(application(None, episodes.twins, title, trials), episodes, title)
     if twins is not None:
         raise UsageError(f"{place}: --twins is for episodes, and there are none")
-    if is_scenes(place):
+    if has_scenes(place):
         scenes = SceneFolders(place, cache)
         title = Path(place).resolve().name
         return scene_application(application(None, scenes.twins, title, trials), scenes, title)
@@ -211,7 +213,7 @@ def serve(
 ) -> None:
     """Serve the pages of ``pages_of`` until interrupted; ``on_ready`` is called once the server listens."""
     with tempfile.TemporaryDirectory(prefix="manitwin-view-") as cache, TrialPlayer() as trials:
-        _run(PageServer(pages_of(place, Path(cache), twins, trials), host, port, on_new_link), on_ready)
+        _run(PageServer(application_for_place(place, Path(cache), twins, trials), host, port, on_new_link), on_ready)
 
 
 def _run(server: PageServer, on_ready: Callable[[PageServer], None]) -> None:

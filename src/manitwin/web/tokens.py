@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from manitwin.errors import UsageError
 from manitwin.formats.json_file import read_json_object
-from manitwin.twin.store import file_beside
+from manitwin.twin.store import atomic_file
 
 MOST_LINKS = 64
 """Maximum number of unused links per person; the oldest are discarded."""
@@ -66,7 +66,7 @@ class AccessFile:
 
     def write(self, content: Mapping[str, Any]) -> None:
         """Replace the content."""
-        with file_beside(self.path) as beside:
+        with atomic_file(self.path) as beside:
             os.close(os.open(beside, os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o600))
             beside.write_text(json.dumps(content))
 
@@ -83,7 +83,7 @@ class Tokens:
         self._content: dict[str, Any] = _Content().model_dump() if kept is None else kept.read()
         self.lasting_s = None if kept is None else LASTING_S
         for entries in (self._content["links"], self._content["cookies"]):
-            for digest in [digest for digest, entry in entries.items() if self._is_over(entry)]:
+            for digest in [digest for digest, entry in entries.items() if self._is_expired(entry)]:
                 del entries[digest]
 
     @property
@@ -92,12 +92,12 @@ class Tokens:
         port: int | None = self._content["port"]
         return port
 
-    def served_at(self, port: int) -> None:
+    def record_port(self, port: int) -> None:
         """Record the port of this server; cookies are specific to it."""
         self._content["port"] = port
         self._write()
 
-    def forget(self) -> None:
+    def revoke_all(self) -> None:
         """Revoke all links and sessions."""
         self._content |= {"links": {}, "cookies": {}}
         self._write()
@@ -133,11 +133,11 @@ class Tokens:
         """Return the stored digest of a token or secret; comparisons take constant time."""
         wanted, found = _digest(given), None
         for digest, entry in self._content[kind].items():
-            if hmac.compare_digest(wanted, digest) and not self._is_over(entry):
+            if hmac.compare_digest(wanted, digest) and not self._is_expired(entry):
                 found = digest
         return found
 
-    def _is_over(self, entry: Mapping[str, Any]) -> bool:
+    def _is_expired(self, entry: Mapping[str, Any]) -> bool:
         return self.lasting_s is not None and self._now() - float(entry["at"]) > self.lasting_s
 
     def _write(self) -> None:

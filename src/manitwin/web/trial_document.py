@@ -45,8 +45,8 @@ def trial_document(twin: Twin, gripper: str, grasp_id: str) -> dict[str, Any]:
         "finger_forces_n": [_number(force) for force in result.finger_forces_n],
         "time_s": [round(float(time), 4) for time in recording.time_s],
         "phases": phase_spans(recording),
-        "hand": poses(hand),
-        "object": poses(hand @ recording.object_to_hand),
+        "hand": pose_rows(hand),
+        "object": pose_rows(hand @ recording.object_to_hand),
         "boxes": _boxes(replayed.gripper, recording.joints),
     }
 
@@ -59,7 +59,7 @@ def phase_spans(recording: TrialRecording) -> list[dict[str, Any]]:
     ]
 
 
-def poses(matrices: np.ndarray) -> list[float]:
+def pose_rows(matrices: np.ndarray) -> list[float]:
     """Return poses ``(S, 4, 4)`` as rows of position and quaternion in a flat list; a single row if all are equal
     after rounding.
     """
@@ -69,14 +69,14 @@ def poses(matrices: np.ndarray) -> list[float]:
 
 def _boxes(gripper: Gripper, joints: np.ndarray) -> list[dict[str, Any]]:
     """Return the boxes of a hand and their poses in its frame for each state of its joints ``(S, J)``."""
-    placed = [_placed(gripper, row) for row in joints]
+    placed = [_hand_boxes(gripper, row) for row in joints]
     return [
-        {"half": [float(each) for each in half], "poses": poses(np.array([row[place][0] for row in placed]))}
+        {"half": [float(each) for each in half], "poses": pose_rows(np.array([row[place][0] for row in placed]))}
         for place, (_, half) in enumerate(placed[0])
     ]
 
 
-def _placed(gripper: Gripper, state: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+def _hand_boxes(gripper: Gripper, state: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     if isinstance(gripper, MultiFingerGripper):
         return gripper.boxes_at(state)
     if not isinstance(gripper, ParallelGripper):

@@ -22,21 +22,21 @@ LONGEST_S = 60.0
 
 
 @dataclass(frozen=True)
-class _Refused:
+class _TrialError:
     """An error of the other process as text, since not every exception can be pickled."""
 
     why: str
     usage: bool
 
 
-def _tried(folder: str, gripper: str, grasp_id: str) -> bytes | _Refused:
+def _trial_or_error(folder: str, gripper: str, grasp_id: str) -> bytes | _TrialError:
     try:
         return trial_bytes(folder, gripper, grasp_id)
     except ManiTwinError as error:
-        return _Refused(str(error), isinstance(error, UsageError))
+        return _TrialError(str(error), isinstance(error, UsageError))
     except Exception as error:  # an altered twin: numbers that no engine accepts, joints that the hand lacks
         cause = printable_line(f"{type(error).__name__}: {error}", max_characters=200)
-        return _Refused(f"{folder}: the trial cannot be run ({cause}); build the twin again", usage=False)
+        return _TrialError(f"{folder}: the trial cannot be run ({cause}); build the twin again", usage=False)
 
 
 class TrialPlayer:
@@ -63,14 +63,14 @@ class TrialPlayer:
             if self._pool is None:
                 self._pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
             try:
-                answer = self._pool.submit(_tried, str(twin.folder), gripper, grasp_id).result(LONGEST_S)
+                answer = self._pool.submit(_trial_or_error, str(twin.folder), gripper, grasp_id).result(LONGEST_S)
             except BrokenProcessPool as error:
                 self._end()
                 raise TwinError("the trial ended its process; all else of the twin is here") from error
             except TimeoutError as error:
                 self._end()
                 raise TwinError(f"the trial took more than {LONGEST_S:.0f} s and was ended") from error
-            if isinstance(answer, _Refused):
+            if isinstance(answer, _TrialError):
                 raise UsageError(answer.why) if answer.usage else TwinError(answer.why)
             self._kept[key] = document = answer
             while len(self._kept) > MOST_KEPT:

@@ -113,7 +113,7 @@ def _grasps(twin: Twin, longest_m: float) -> dict[str, Any]:
         poses = np.array(
             [transform(r, t) for r, t in zip(rotation_from_quaternion_wxyz(quaternions), positions, strict=True)]
         )
-        order = _far_apart(poses, depths)
+        order = _farthest_first_order(poses, depths)
         shapes[gripper] = gripper_shape(gripper, rod, float(np.median(depths)))
         chosen = [rows[i] for i in order]
         grasps[gripper] = {
@@ -128,7 +128,7 @@ def _grasps(twin: Twin, longest_m: float) -> dict[str, Any]:
     return {"grasps": grasps, "grippers": shapes}
 
 
-def _far_apart(poses: np.ndarray, depths: np.ndarray) -> list[int]:
+def _farthest_first_order(poses: np.ndarray, depths: np.ndarray) -> list[int]:
     """Return the grasps in farthest-first order."""
     first = [int(i) for i in farthest_grasps(poses, depths, min(len(poses) - 1, MOST_GRASPS))] if len(poses) > 1 else []
     last = [i for i in range(len(poses)) if i not in set(first)]

@@ -37,7 +37,7 @@ def _estimate(name: str, estimate: Estimate, unit: str) -> tuple[Any, ...]:
     return (name, f"{number(estimate.value)}{unit}", interval, estimate.source)
 
 
-def _filled(physical: Physical) -> list[tuple[Any, ...]]:
+def _filling_rows(physical: Physical) -> list[tuple[Any, ...]]:
     """Return a row for each filling state of a closed vessel except the full state, which the twin represents."""
     if physical.filling is None:
         return []
@@ -73,7 +73,7 @@ def _physical(physical: Physical, stages: Any) -> str:
         ("oriented box", f"{' × '.join(box)} cm", None, FROM_MESH + scaled),
         _estimate("mass", physical.mass_kg, " kg"),
         ("density", f"{number(physical.density_kg_m3)} kg/m³", None, "mass by volume"),
-        *_filled(physical),
+        *_filling_rows(physical),
         _estimate("friction, static", physical.friction_static, ""),
         _estimate("friction, dynamic", physical.friction_dynamic, ""),
         _estimate("restitution", physical.restitution, ""),

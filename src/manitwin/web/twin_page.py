@@ -53,7 +53,7 @@ def twin_page(twin: Twin, links: Links, *, with_gallery: bool = True, with_trial
     own = () if links.live else (DATA_SCRIPT, MODEL_SCRIPT, *((TRIALS_SCRIPT,) if with_trials else ()))
     body += (
         f'<div class="twin">\n{viewer(record, links, with_trials=with_trials)}'
-        f'<main id="main">\n{_words(record)}{fact_tables(record)}'
+        f'<main id="main">\n{_language_section(record)}{fact_tables(record)}'
         f"{_downloads(record, links)}</main>\n</div>\n{pictures(twin, links)}"
     )
     return page(name, body, links, scripts=SCRIPTS, data=own)
@@ -105,7 +105,7 @@ def _trial() -> str:
     )
 
 
-def _words(record: TwinRecord) -> str:
+def _language_section(record: TwinRecord) -> str:
     language = record.language
     if language is None:
         return ""

@@ -25,7 +25,7 @@ from manitwin.geometry.hulls.reduction import hull_mesh, hull_to_obj
 from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.geometry.poses import quaternion_wxyz, transform
 from manitwin.twin.grasp_table import SCHEMA
-from manitwin.twin.store import RECORD, parse_record, seal
+from manitwin.twin.store import RECORD, parse_record, write_twin_record
 from record_overlay import overlaid
 from twin_folders import write_accepted
 
@@ -225,5 +225,5 @@ def write_twin(root: Path, changes: dict[str, Any] | None = None) -> Path:
     }
     sealed = overlaid(overlaid(record, said), changes or {})
     del sealed["revision"]
-    seal(folder, sealed)
+    write_twin_record(folder, sealed)
     return folder

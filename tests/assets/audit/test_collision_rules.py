@@ -13,9 +13,9 @@ from made_mug import clean, moved, shape, textured
 
 from manitwin.assets.asset import Asset, Inertial
 from manitwin.assets.audit.check import audit_asset, audit_path
+from manitwin.assets.audit.engine_shapes import A_HULL_EACH_GROUP, ONE_HULL, TRIANGLES
 from manitwin.assets.audit.rules import RULES, RULES_BY_CODE
 from manitwin.assets.audit.run import TAKEN_BY, audit_assets
-from manitwin.assets.audit.taken_by import A_HULL_EACH_GROUP, ONE_HULL, TRIANGLES
 from manitwin.errors import UsageError
 
 

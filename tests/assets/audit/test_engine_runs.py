@@ -11,7 +11,7 @@ import trimesh
 from made_mug import clean
 
 from manitwin.assets.asset import Asset, CollisionShape
-from manitwin.assets.audit.ball_runs import balls
+from manitwin.assets.audit.ball_runs import drop_balls
 from manitwin.assets.audit.check import audit_asset
 from manitwin.assets.audit.finding import Finding
 from manitwin.assets.audit.measured import MeasuredAsset
@@ -120,5 +120,5 @@ def test_an_opening_is_up_by_the_assets_own_axis() -> None:
         visual=tuple(bake_transform(part, transform(turn, np.zeros(3))) for part in asset.visual),
         collision=tuple(replace(shape, vertices=shape.vertices @ turn.T) for shape in asset.collision),
     )
-    result = balls(MeasuredAsset(turned, ("mujoco",)))
+    result = drop_balls(MeasuredAsset(turned, ("mujoco",)))
     assert result.opening is not None and result.inside == {"mujoco": True}

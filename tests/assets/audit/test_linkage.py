@@ -10,9 +10,9 @@ from made_cabinet import cabinet_urdf, write_cabinet
 
 from manitwin.assets.audit.check import audit_path
 from manitwin.assets.audit.finding import Finding
-from manitwin.assets.audit.linkage.overlaps import overlaps_of
+from manitwin.assets.audit.linkage.overlaps import find_overlaps
 from manitwin.assets.audit.linkage.read import read_linkage
-from manitwin.assets.audit.linkage.sweeps import swept
+from manitwin.assets.audit.linkage.sweeps import sweep_joints
 from manitwin.assets.audit.rules import RULES
 
 PARTS = [rule for rule in RULES if rule.code in ("RUN009", "RUN010")]
@@ -46,7 +46,7 @@ def test_parts_that_no_joint_joins_are_as_deep_in_each_other_as_boxes_are(tmp_pa
     path = urdf(tmp_path, ("left", "prismatic", "0.3 0 0"), ("right", "prismatic", "0.45 0 0"))
     linkage = read_linkage(path, "urdf")
     assert linkage is not None
-    (overlap,) = overlaps_of(linkage)
+    (overlap,) = find_overlaps(linkage)
     assert {overlap.one, overlap.other} == {"left", "right"} and overlap.depth_m == pytest.approx(0.05, abs=1e-4)
     (finding,) = found(path)
     assert finding.code == "RUN009" and "50 mm" in finding.message
@@ -91,7 +91,7 @@ def test_a_drawer_that_slides_the_wrong_way_goes_through_the_back(tmp_path: Path
     path.write_text(path.read_text().replace('<axis xyz="0.0 -1.0 0.0"/>', '<axis xyz="0 1 0"/>'))
     linkage = read_linkage(path, "urdf")
     assert linkage is not None
-    shares = {entry.joint.name: entry.crossing for entry in swept(linkage)}
+    shares = {entry.joint.name: entry.crossing for entry in sweep_joints(linkage)}
     assert shares["slide"] > 0.5 and shares["hinge"] < 0.1 and "press" not in shares, "a button is pressed"
     (finding,) = found(path)
     assert finding.code == "RUN010" and "drives" in finding.message and "'drawer' through 'cabinet'" in finding.message

@@ -13,7 +13,7 @@ from manitwin.assets.audit.rules import RULES
 from manitwin.formats.npy_file import labels_to_npy
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import FACE_PARTS
-from manitwin.twin.store import RECORD, parse_record, seal
+from manitwin.twin.store import RECORD, parse_record, write_twin_record
 from twin_folders import write_rejected
 
 
@@ -62,7 +62,7 @@ def test_twin_whose_parts_have_other_faces_than_the_record_says(tmp_path: Path) 
     }
     for faces, found in ((len(labels), set()), (len(labels) - 1, {"TWN003"})):
         record.pop("revision", None)
-        seal(folder, {**record, "parts": [part | {"faces": faces}]})
+        write_twin_record(folder, {**record, "parts": [part | {"faces": faces}]})
         assert errors(audit_path(folder, RULES).findings) == found
 
 
@@ -88,5 +88,5 @@ def test_twin_whose_frames_are_beside_their_feature_or_of_another_kind(tmp_path:
         frame = frame_of | {"kind": kind, "position_m": (on_surface + np.array([0, 0, lifted_m])).tolist()}
         record.pop("revision", None)
         record["points"]["functional"] = [point | {"label": label, "frame": frame}]
-        seal(folder, record)
+        write_twin_record(folder, record)
         assert {code for code in codes(audit_path(folder, RULES).findings) if code in ("TWN004", "TWN005")} == found

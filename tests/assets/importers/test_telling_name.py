@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from manitwin.assets.importers.telling_name import telling_name
+from manitwin.assets.importers.asset_name import informative_name
 
 
 @pytest.mark.parametrize(
@@ -27,7 +27,7 @@ from manitwin.assets.importers.telling_name import telling_name
     ],
 )
 def test_a_name_that_tools_write_gives_way_to_that_of_the_file(name: str, path: str, told: str) -> None:
-    assert telling_name(name, Path("/") / path) == told
+    assert informative_name(name, Path("/") / path) == told
 
 
 @pytest.mark.parametrize(
@@ -46,4 +46,4 @@ def test_the_name_of_another_file_around_says_nothing(tmp_path: Path, name: str,
     for each in ("cube.urdf", file):
         (tmp_path / each).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / each).touch()
-    assert telling_name(name, tmp_path / file) == expected
+    assert informative_name(name, tmp_path / file) == expected

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from manitwin.assets.writers.robotwin import noun_phrases, seen_and_unseen
+from manitwin.assets.writers.robotwin import noun_phrases, split_phrases
 from manitwin.errors import ExportError
 from manitwin.twin.record import Language
 
@@ -26,7 +26,7 @@ def test_commands_and_sentences_are_left_out() -> None:
 
 @pytest.mark.parametrize("color", ["white", "unknown color (untextured)"])
 def test_seen_and_unseen_are_disjoint_and_complete(color: str) -> None:
-    seen, unseen = seen_and_unseen(MUG.model_copy(update={"color": color, "captions": []}), 12, 3)
+    seen, unseen = split_phrases(MUG.model_copy(update={"color": color, "captions": []}), 12, 3)
     assert len(set(seen)) == 12 and len(set(unseen)) == 3
     assert not {s.lower() for s in seen} & {s.lower() for s in unseen}
     assert not any("unknown" in phrase for phrase in seen + unseen)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from manitwin.dataset.affordances.blind import blind_maps, blind_parts, part_shares
+from manitwin.dataset.affordances.baselines import baseline_part_accuracy, baseline_scores, part_shares
 from manitwin.dataset.affordances.report import affordances_page
 
 
@@ -24,7 +24,7 @@ LINE = [[x, 0, 0] for x in (-2, -1, 0, 1, 2)]
 
 
 def test_a_map_that_is_the_baseline_scores_as_such() -> None:
-    found = blind_maps(maps_of(LINE, same=[1] * 5, middle=[0, 0.5, 1, 0.5, 0], ends=[1, 0, 0, 0, 1], none=[0] * 5))
+    found = baseline_scores(maps_of(LINE, same=[1] * 5, middle=[0, 0.5, 1, 0.5, 0], ends=[1, 0, 0, 0, 1], none=[0] * 5))
     assert found["same"].uniform_sim == pytest.approx(1) and np.isnan(found["same"].middle_auc)
     assert found["middle"].middle_sim == pytest.approx(1) and found["middle"].middle_auc == 1
     assert found["middle"].uniform_sim == pytest.approx(3 / 5)  # min(1/5, [0, 1/4, 1/2, 1/4, 0]) summed
@@ -43,8 +43,8 @@ def test_parts_are_guessed_from_other_twins_of_the_category_alone() -> None:
         {"category": "pen", "part_shares": {}},
     ]
     # of each mug the other two have more body than anything else; of the fork there is no other
-    assert blind_parts(rows) == (pytest.approx((0.75 + 0.4 + 0.9) / 3), 3)
-    assert blind_parts(rows[3:]) == (None, 0)
+    assert baseline_part_accuracy(rows) == (pytest.approx((0.75 + 0.4 + 0.9) / 3), 3)
+    assert baseline_part_accuracy(rows[3:]) == (None, 0)
 
 
 def test_page_says_medians_by_kind_beside_the_agreement() -> None:

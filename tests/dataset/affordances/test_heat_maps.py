@@ -11,8 +11,8 @@ from manitwin.dataset.affordances.heat_maps import (
     contact_density,
     contact_points,
     function_map,
-    halves_agreement,
     similarity,
+    split_half_agreement,
     surface_distances,
 )
 from manitwin.geometry.poses import transform
@@ -76,10 +76,10 @@ def test_similarity_and_area_are_those_of_their_definitions() -> None:
 def test_halves_agree_by_the_points_that_the_other_half_calls_its_own() -> None:
     line = np.stack([np.linspace(0, 1, 101), np.zeros(101), np.zeros(101)], axis=1)
     near, far = np.tile([0.2, 0, 0], (8, 1)), np.tile([0.8, 0, 0], (8, 1))
-    same = halves_agreement(line, near, near, 0.05)
+    same = split_half_agreement(line, near, near, 0.05)
     assert same == (pytest.approx(1), pytest.approx(1))
-    apart = halves_agreement(line, near, far, 0.05)
+    apart = split_half_agreement(line, near, far, 0.05)
     assert apart[0] < 0.01 and apart[1] < 0.3
     # half of the first map's contacts lie at the second's place: it is found among the higher half of the points
-    both = halves_agreement(line, np.concatenate([near, far]), far, 0.05)
+    both = split_half_agreement(line, np.concatenate([near, far]), far, 0.05)
     assert both[0] == pytest.approx(0.5, abs=0.02) and both[1] == pytest.approx(1 - 0.5 * 11 / 90, abs=0.02)

@@ -18,7 +18,7 @@ from manitwin.robots import grippers
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from scene_twins import BOWL_HEIGHT_M, BOWL_RADIUS_M, bowl, can, slab, write_thing
 from twin_folders import tried_as_built, twin_id
 
@@ -36,7 +36,7 @@ def _tried(folder: Path) -> None:
     record = json.loads((folder / RECORD).read_bytes())
     record["grasps"]["trial"] = tried_as_built()
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_an_opening_is_used_all_around_its_rim_inside_and_outside(tmp_path: Path
     }  # fmt: skip
     record["grasps"]["trial"] = tried_as_built()
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
     maps = surface_maps(Twin(folder), points=1500, trials=1, seed=0)
     label = maps.maps["function:f0 opening"]
     radius_m = np.linalg.norm(maps.points_m[:, :2], axis=1)
@@ -150,7 +150,7 @@ def test_a_category_that_is_a_path_stays_below_the_folder(dataset: Path, tmp_pat
     record = json.loads((folder / RECORD).read_bytes())
     record["language"]["category"] = "../../../away/ca n"
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
     write_affordances(copied, tmp_path / "deep" / "out", points=60, trials=3)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["deep", "set"]
     assert (tmp_path / "deep" / "out" / "parts" / "away_ca_n").is_dir()
@@ -203,7 +203,7 @@ def test_maps_are_of_the_first_gripper_with_parallel_jaws(tmp_path: Path) -> Non
         record["grasps"] |= {"gripper": "suction"}
         record["grasps"]["other_grippers"] = {jaws["gripper"]: summary} if identity == both else {}
         del record["revision"], record["files"]
-        seal(folder, record)
+        write_twin_record(folder, record)
     done = write_affordances(tmp_path / "set", tmp_path / "out", points=200, trials=12)
     assert (done.twins, done.with_grasp_map) == (1, 1) and list(done.left_out) == [cup_alone]
     assert "suction has no parallel jaws" in done.left_out[cup_alone]
@@ -218,7 +218,7 @@ def test_maps_of_a_gripper_of_ones_own_are_made_with_its_file(tmp_path: Path) ->
     record = json.loads((folder / RECORD).read_bytes())
     record["grasps"] |= {"trial": tried_as_built(), "gripper": "mine", "gripper_sha256": mine.sha256}
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
     without = write_affordances(tmp_path / "set", tmp_path / "without", points=60, trials=3)
     assert "give its file with --gripper" in without.left_out[identity]
     done = write_affordances(tmp_path / "set", tmp_path / "out", points=200, trials=12, grippers=[mine])

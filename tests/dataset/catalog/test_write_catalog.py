@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from pycocotools.coco import COCO
 
-from manitwin.dataset.catalog.groups import groups_of, split_of
+from manitwin.dataset.catalog.groups import assign_groups, split_of
 from manitwin.dataset.catalog.surface import surface_points
 from manitwin.dataset.catalog.write import write_catalog
 from manitwin.dataset.index.near_duplicates import NearDuplicates, NearPair
@@ -56,7 +56,7 @@ def test_near_duplicates_are_in_one_split(written: Path) -> None:
 
 def test_groups_join_what_any_link_joins() -> None:
     near = NearDuplicates({"s": ["b", "d"]}, [NearPair("a", "b", 0.0, 1.0), NearPair("c", "e", 0.0, 1.0)])
-    assert groups_of(list("abcdef"), near) == {"a": "a", "b": "a", "c": "c", "d": "a", "e": "c", "f": "f"}
+    assert assign_groups(list("abcdef"), near) == {"a": "a", "b": "a", "c": "c", "d": "a", "e": "c", "f": "f"}
     splits = [split_of(str(number)) for number in range(4000)]
     for split, share in zip(SPLITS, (0.8, 0.1, 0.1), strict=True):
         assert splits.count(split) / 4000 == pytest.approx(share, abs=0.02)

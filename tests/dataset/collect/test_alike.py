@@ -13,12 +13,12 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from manitwin.cli.main import app
-from manitwin.dataset.collect.alike import mark_alike
-from manitwin.dataset.collect.intake import Given, add
-from manitwin.dataset.collect.looks import SHAPE, shape_look, similarity
+from manitwin.dataset.collect.intake import DefaultValues, add_inputs
+from manitwin.dataset.collect.looks import SHAPE, shape_feature, similarity
+from manitwin.dataset.collect.near_duplicates import mark_near_duplicates
 from manitwin.dataset.collect.schema import APPLICATION, MIGRATIONS
 
-MINE = Given(source="mine", licence="CC0-1.0")
+MINE = DefaultValues(source="mine", licence="CC0-1.0")
 
 
 def photo(seed: int) -> Image.Image:
@@ -58,23 +58,23 @@ def states(catalogue: Path) -> dict[str, tuple[str, int | None]]:
 
 def test_what_looks_like_an_earlier_input_is_its_duplicate(inputs: Path, tmp_path: Path) -> None:
     catalogue = tmp_path / "c.db"
-    add(catalogue, inputs, MINE)
-    assert mark_alike(catalogue) == {"picture": 1, "shape": 1}
+    add_inputs(catalogue, inputs, MINE)
+    assert mark_near_duplicates(catalogue) == {"picture": 1, "shape": 1}
     found = states(catalogue)
     assert found["c"] == ("duplicate", 1) and found["f"] == ("duplicate", 4)
     assert all(found[name] == ("ready", None) for name in "abdeg")
-    assert mark_alike(catalogue) == {"picture": 1, "shape": 1}, "the same again"
-    add(catalogue, inputs, MINE)
+    assert mark_near_duplicates(catalogue) == {"picture": 1, "shape": 1}, "the same again"
+    add_inputs(catalogue, inputs, MINE)
     assert states(catalogue) == found, "adding again leaves them"
 
 
 def test_what_it_looked_like_is_gone_and_it_is_ready_again(inputs: Path, tmp_path: Path) -> None:
     catalogue = tmp_path / "c.db"
-    add(catalogue, inputs, MINE)
-    mark_alike(catalogue)
+    add_inputs(catalogue, inputs, MINE)
+    mark_near_duplicates(catalogue)
     photo(7).save(inputs / "a_first.png")
-    add(catalogue, inputs, MINE)
-    mark_alike(catalogue)
+    add_inputs(catalogue, inputs, MINE)
+    mark_near_duplicates(catalogue)
     assert states(catalogue)["c"] == ("ready", None)
 
 
@@ -90,11 +90,11 @@ def test_shapes_are_alike_in_any_turn_and_size_and_others_are_not() -> None:
     turned.apply_transform(trimesh.transformations.rotation_matrix(0.7, (3, 1, 2)))
     looks = np.array(
         [
-            shape_look(each)
+            shape_feature(each)
             for each in (turned.subdivide(), trimesh.creation.icosphere(), trimesh.creation.box((3, 2, 1)))
         ]
     )
-    near = similarity(shape_look(solid()), looks, SHAPE)
+    near = similarity(shape_feature(solid()), looks, SHAPE)
     assert near[0] > 0.999 and near[1] == 0 and near[2] < 0.95
 
 
@@ -102,7 +102,7 @@ def test_a_catalogue_of_before_looks_is_brought_on(inputs: Path, tmp_path: Path)
     catalogue = tmp_path / "old.db"
     with closing(sqlite3.connect(catalogue)) as connection:
         connection.executescript(f"{MIGRATIONS[0]} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = 1;")
-    add(catalogue, inputs, MINE)
+    add_inputs(catalogue, inputs, MINE)
     with closing(sqlite3.connect(catalogue)) as connection:
         assert connection.execute("PRAGMA user_version").fetchone() == (len(MIGRATIONS),)
         assert connection.execute("SELECT count(*) FROM looks").fetchone() == (0,)

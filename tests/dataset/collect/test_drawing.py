@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 from json_documents import check_keys
 from manitwin.cli.main import app
 from manitwin.config import BuildConfig, GenerateConfig, ServicesConfig
-from manitwin.dataset.collect.drawing import STYLE, Drawn, Prompt, draw_pictures, read_prompts
 from manitwin.dataset.collect.store import Catalogue
+from manitwin.dataset.collect.text_to_image import STYLE, DrawingSummary, Prompt, draw_pictures, read_prompts
 from manitwin.errors import BackendError, BadReply, ConfigError, ManiTwinError, UsageError
 from manitwin.formats.image_file import read_image
 from manitwin.models.fakes.fal import FakeFal
@@ -52,7 +52,7 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FAL_KEY", KEY)
 
 
-def draw(service: FakeService, spec: str, out: Path, config: BuildConfig | None = None) -> Drawn:
+def draw(service: FakeService, spec: str, out: Path, config: BuildConfig | None = None) -> DrawingSummary:
     config = config or settings()
     with painted(service, spec, out, config) as painter:
         return draw_pictures(PROMPTS, out, painter, config, sleep=lambda seconds: None)
@@ -74,13 +74,13 @@ SERVICES: dict[str, tuple[str, Callable[[], FakeService]]] = {
 def test_each_prompt_is_drawn_once_and_the_manifest_is_one_that_a_build_reads(tmp_path: Path, name: str) -> None:
     spec, service = SERVICES[name]
     served = service()
-    assert draw(served, spec, tmp_path) == Drawn(made=3, usd=1.5)
+    assert draw(served, spec, tmp_path) == DrawingSummary(made=3, usd=1.5)
     first = {path.name: path.read_bytes() for path in tmp_path.rglob("*.*") if path.is_file()}
     rows = manifest(tmp_path)
     assert [row["name"] for row in rows] == ["mug", "spoon", "hammer"]
     assert all(read_image(tmp_path / row["file"]).pixels.shape == (128, 128, 3) for row in rows)
     assert "a red mug" in rows[0]["attribution"] and spec.split(":")[1] in rows[0]["attribution"]
-    assert draw(served, spec, tmp_path) == Drawn(there=3), "nothing is asked again"
+    assert draw(served, spec, tmp_path) == DrawingSummary(there=3), "nothing is asked again"
     assert {path.name: path.read_bytes() for path in tmp_path.rglob("*.*") if path.is_file()} == first
     items = list(iterate_items([tmp_path / "manifest.csv"], {}, Notes(), strict=True))
     assert len(items) == 3
@@ -99,7 +99,7 @@ def test_a_budget_stops_before_it_is_passed_and_another_run_goes_on(tmp_path: Pa
     assert (stopped.made, stopped.usd, len(served.drawn)) == (2, 1.0, 2)
     assert stopped.stopped is not None and "of at most 1.2 USD" in stopped.stopped
     assert len(manifest(tmp_path)) == 2
-    assert draw(served, "openai:m", tmp_path) == Drawn(made=1, there=2, usd=0.5)
+    assert draw(served, "openai:m", tmp_path) == DrawingSummary(made=1, there=2, usd=0.5)
 
 
 def test_what_the_model_refuses_is_kept_with_its_cause_and_not_asked_again(tmp_path: Path) -> None:

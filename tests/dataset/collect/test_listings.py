@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from manitwin.dataset.collect.intake import Given, add
+from manitwin.dataset.collect.intake import DefaultValues, add_inputs
 from manitwin.errors import UsageError
 
 UID = "8476c4170df24cf5bbe6967222d1a42d"
@@ -50,7 +50,7 @@ def rows(catalogue: Path, columns: str) -> list[tuple[object, ...]]:
 
 
 def test_objaverses_metadata_are_addresses_with_licence_and_author(tmp_path: Path) -> None:
-    done = add(tmp_path / "c.db", packed(tmp_path, OBJAVERSE), Given())
+    done = add_inputs(tmp_path / "c.db", packed(tmp_path, OBJAVERSE), DefaultValues())
     assert (done.new, done.refused) == (2, [])
     assert rows(tmp_path / "c.db", "place, licence, attribution, category, source, status") == [
         (
@@ -67,14 +67,14 @@ def test_objaverses_metadata_are_addresses_with_licence_and_author(tmp_path: Pat
 def test_with_a_root_the_files_that_were_fetched_are_meant(tmp_path: Path) -> None:
     (tmp_path / "glbs" / "000-023").mkdir(parents=True)
     (tmp_path / "glbs" / "000-023" / f"{UID}.glb").write_bytes(b"glTF")
-    add(tmp_path / "c.db", packed(tmp_path, OBJAVERSE), Given(), root=tmp_path)
+    add_inputs(tmp_path / "c.db", packed(tmp_path, OBJAVERSE), DefaultValues(), root=tmp_path)
     assert rows(tmp_path / "c.db", "kind, status, licence") == [
         ("mesh", "ready", "CC-BY-4.0"), ("mesh", "unreadable", "CC-BY-NC-SA-4.0"),
     ]  # fmt: skip
 
 
 def test_fuels_models_are_rows_and_one_without_a_name_is_a_counted_cause(tmp_path: Path) -> None:
-    done = add(tmp_path / "c.db", packed(tmp_path, FUEL, "models.json"), Given())
+    done = add_inputs(tmp_path / "c.db", packed(tmp_path, FUEL, "models.json"), DefaultValues())
     assert done.new == 1 and [(each.cause, each.count) for each in done.refused] == [
         ("has neither a file nor a url", 1)
     ]
@@ -97,11 +97,11 @@ def test_fuels_models_are_rows_and_one_without_a_name_is_a_counted_cause(tmp_pat
 )
 def test_other_json_is_refused_as_a_whole(told: Any, said: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=said):
-        add(tmp_path / "c.db", packed(tmp_path, told), Given())
+        add_inputs(tmp_path / "c.db", packed(tmp_path, told), DefaultValues())
 
 
 def test_a_file_that_is_not_packed_is_refused_in_one_line(tmp_path: Path) -> None:
     path = packed(tmp_path, OBJAVERSE)
     path.write_bytes(path.read_bytes()[:40])
     with pytest.raises(UsageError, match="cannot be unpacked"):
-        add(tmp_path / "c.db", path, Given())
+        add_inputs(tmp_path / "c.db", path, DefaultValues())

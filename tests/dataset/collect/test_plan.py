@@ -14,20 +14,20 @@ from typer.testing import CliRunner
 
 from json_documents import check_keys
 from manitwin.cli.main import app
-from manitwin.dataset.collect.facts import GROUPS, band_of, facts_of
+from manitwin.dataset.collect.facts import GROUPS, infer_facts, size_band_of
 from manitwin.dataset.collect.plan_files import MANIFEST, PROMPTS, write_plan
 from manitwin.dataset.collect.planning import INSIDE, plan_inputs, shares
-from manitwin.dataset.collect.sentences import SENTENCES, sentence
+from manitwin.dataset.collect.prompt_templates import SENTENCES, format_prompt
 from manitwin.dataset.collect.store import Row
 from manitwin.models.annotators.priors import load_priors
 from manitwin.pipeline.manifest import Notes, iterate_items
 
 
 def row(number: int, category: str = "mug", **changes: object) -> Row:
-    said = facts_of(category, None)
+    said = infer_facts(category, None)
     made = Row(
         f"/inputs/{number}.obj", "mesh", "shop", "CC0-1.0", None, category, said.category, said.group, said.size_m,
-        said.size_source, band_of(said.size_m), f"{number:064x}", 10, 1, "ready", None,
+        said.size_source, size_band_of(said.size_m), f"{number:064x}", 10, 1, "ready", None,
     )  # fmt: skip
     return replace(made, **changes)  # type: ignore[arg-type]
 
@@ -46,7 +46,7 @@ def test_groups_get_equal_shares_and_their_sizes_and_categories_take_turns() -> 
     assert plan.wanted == dict.fromkeys(GROUPS, 10)
     assert plan.there == {**dict.fromkeys(GROUPS, 0), "kitchen": 10, "tools": 10}
     assert Counter(each.category for each in plan.chosen) == {"mug": 5, "spoon": 5, "hammer": 10}
-    assert Counter(facts_of(prompt.category, None).group for prompt in plan.prompts) == dict.fromkeys(GROUPS[2:], 10)
+    assert Counter(infer_facts(prompt.category, None).group for prompt in plan.prompts) == dict.fromkeys(GROUPS[2:], 10)
     assert plan.chosen == plan_inputs(rows[::-1], 60).chosen, "in whatever order they were added"
     assert plan.chosen != plan_inputs(rows, 60, seed=5).chosen
     assert shares(10, 6) == [2, 2, 2, 2, 1, 1]
@@ -72,8 +72,8 @@ def test_addresses_unknown_licences_categories_and_sizes_are_left_out_and_counte
 
 
 def test_every_group_has_categories_of_sizes_that_the_paper_keeps() -> None:
-    said = [facts_of(name, None) for name in load_priors()]
-    assert {each.group for each in said if band_of(each.size_m) in INSIDE} >= set(GROUPS)
+    said = [infer_facts(name, None) for name in load_priors()]
+    assert {each.group for each in said if size_band_of(each.size_m) in INSIDE} >= set(GROUPS)
 
 
 def test_prompts_name_their_category_and_differ() -> None:
@@ -86,7 +86,7 @@ def test_prompts_name_their_category_and_differ() -> None:
 
 def test_a_prompt_asks_for_a_pair_of_what_comes_in_pairs() -> None:
     scissors = load_priors()["scissors"]
-    said = [sentence(scissors, number, np.random.default_rng(number)) for number in range(len(SENTENCES))]
+    said = [format_prompt(scissors, number, np.random.default_rng(number)) for number in range(len(SENTENCES))]
     assert said[0] == "a pair of scissors" and all("pair of scissors" in each for each in said)
 
 

@@ -13,8 +13,8 @@ from manitwin.cli.main import app
 from manitwin.dataset.evaluation.annotations import AnnotationReport, evaluate_annotations
 from manitwin.dataset.evaluation.labels import read_labels
 from manitwin.errors import UsageError
-from manitwin.twin.shares import wilson_interval
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.proportions import wilson_interval
+from manitwin.twin.store import RECORD, write_twin_record
 from twin_folders import write_set
 
 TRUE = {
@@ -92,7 +92,7 @@ def test_a_mass_without_an_interval_lies_in_the_labels(tmp_path: Path, high_kg: 
     record = json.loads((folder / RECORD).read_bytes())
     record["physical"]["mass_kg"] |= {"value": 0.1, "low": 0.1, "high": 0.1, "source": "template:mug"}
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
     report = scored(tmp_path, tmp_path, plausible_mass_low_kg="0.09", plausible_mass_high_kg=high_kg)
     assert [score.right for score in report.scores if score.question == "mass interval"] == [right]
 

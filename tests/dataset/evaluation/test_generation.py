@@ -20,8 +20,8 @@ from manitwin.cli.main import app
 from manitwin.config import ServicesConfig
 from manitwin.dataset.evaluation import thirty_views
 from manitwin.dataset.evaluation.generation import evaluate_generation
-from manitwin.dataset.evaluation.input_likeness import METRICS, Models, partners
-from manitwin.dataset.evaluation.source_picture import Source, best_outline, outline
+from manitwin.dataset.evaluation.input_likeness import METRICS, Models, draw_partners
+from manitwin.dataset.evaluation.source_picture import Source, best_silhouette_iou, normalize_silhouette
 from manitwin.dataset.index.rebuild import rebuild
 from manitwin.errors import UsageError
 from manitwin.models.embedders.clip import ClipFolder
@@ -30,7 +30,7 @@ from manitwin.render.cameras import framing_camera
 from manitwin.render.renderer import shared_renderer
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from tiny_clip import write_tiny_clip
 from twin_folders import box, twin_id, write_accepted, write_rejected
 
@@ -52,7 +52,7 @@ def given(root: Path, number: int, kind: str) -> None:
         rgba = np.dstack([frame.rgb, np.rint(255 * frame.coverage).astype(np.uint8)])
         Image.fromarray(rgba).save(folder / "source.png")
         record["source"] |= {"kind": "image", "file": "source.png"}
-    seal(folder, record)
+    write_twin_record(folder, record)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -151,13 +151,13 @@ def test_the_share_of_inputs_that_became_twins_leaves_meshes_out(place: Path) ->
 def test_an_outline_is_the_same_moved_scaled_and_turned() -> None:
     mask = np.zeros((200, 300), np.float32)
     mask[40:60, 30:150], mask[60:120, 30:50] = 1, 1
-    same = outline(np.rot90(np.kron(mask, np.ones((2, 2)))).astype(np.float32), np.pi / 2)
-    both = outline(mask)
+    same = normalize_silhouette(np.rot90(np.kron(mask, np.ones((2, 2)))).astype(np.float32), np.pi / 2)
+    both = normalize_silhouette(mask)
     assert (same & both).sum() / (same | both).sum() > 0.9
     view = thirty_views.View(*[np.zeros((1, 1, 3), np.uint8)] * 3, np.rot90(mask))
     mirrored = thirty_views.View(*[np.zeros((1, 1, 3), np.uint8)] * 3, mask[::-1])
-    assert best_outline(mask, [mirrored, view])[1] == 1 and best_outline(mask, [view])[0] > 0.9
-    assert best_outline(mask, [mirrored])[0] < 0.85
+    assert best_silhouette_iou(mask, [mirrored, view])[1] == 1 and best_silhouette_iou(mask, [view])[0] > 0.9
+    assert best_silhouette_iou(mask, [mirrored])[0] < 0.85
 
 
 def test_inputs_are_shuffled_among_their_kind_and_never_with_the_same() -> None:
@@ -165,7 +165,7 @@ def test_inputs_are_shuffled_among_their_kind_and_never_with_the_same() -> None:
         Source("text", "x", text="cup"),
         Source("text", "y", text="cup"),
     ]
-    chosen = partners(sources, np.random.default_rng(0))
+    chosen = draw_partners(sources, np.random.default_rng(0))
     assert chosen[6:] == [None, None]
     for place, other in enumerate(chosen[:6]):
         assert other is not None and other < 6 and sources[other].sha256 != sources[place].sha256

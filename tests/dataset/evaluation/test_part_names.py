@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from manitwin.dataset.evaluation.part_names import is_on_one_of, is_one_of, matches
+from manitwin.dataset.evaluation.part_names import is_on_any, is_same_part, matches_any
 
 
 def test_names_are_the_same_where_the_words_of_one_are_among_those_of_the_other() -> None:
-    assert matches("pull tab", "tab") and matches("blade", "cutting blades") and matches("Handle", "handles")
-    assert not matches("handle", "head") and not matches("", "handle")
+    assert (
+        is_same_part("pull tab", "tab")
+        and is_same_part("blade", "cutting blades")
+        and is_same_part("Handle", "handles")
+    )
+    assert not is_same_part("handle", "head") and not is_same_part("", "handle")
 
 
 @pytest.mark.parametrize(
@@ -29,8 +33,8 @@ def test_names_are_the_same_where_the_words_of_one_are_among_those_of_the_other(
     ],
 )
 def test_what_is_on_a_listed_part_or_is_it_in_another_word_is_right(name: str, listed: str) -> None:
-    assert is_on_one_of(name, ["hinge", listed])
-    assert not is_one_of(name, ["hinge", listed]), "the name itself is another"
+    assert is_on_any(name, ["hinge", listed])
+    assert not matches_any(name, ["hinge", listed]), "the name itself is another"
 
 
 @pytest.mark.parametrize(
@@ -49,4 +53,4 @@ def test_what_is_on_a_listed_part_or_is_it_in_another_word_is_right(name: str, l
     ],
 )
 def test_what_is_another_part_or_the_whole_of_a_listed_one_is_wrong(name: str, listed: str) -> None:
-    assert not is_on_one_of(name, ["hinge", listed])
+    assert not is_on_any(name, ["hinge", listed])

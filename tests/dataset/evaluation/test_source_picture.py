@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from manitwin.dataset.evaluation.source_picture import source_of
+from manitwin.dataset.evaluation.source_picture import load_source
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record import Source
 
@@ -36,7 +36,7 @@ def _twin(folder: Path, **said: object) -> Twin:
 
 @pytest.mark.parametrize("said", [{"box_px": [50.0, 50.0, 190.0, 190.0]}, {"mask": "source_mask.png"}])
 def test_the_source_is_the_thing_that_was_meant(tmp_path: Path, said: dict[str, object]) -> None:
-    found = source_of(_twin(tmp_path, **said))
+    found = load_source(_twin(tmp_path, **said))
     assert found is not None and not found.left_out and found.rgb is not None and found.mask is not None
     inside = found.rgb[found.mask > 0.9].mean(0)
     assert inside[0] > 2 * inside[2]
@@ -44,5 +44,5 @@ def test_the_source_is_the_thing_that_was_meant(tmp_path: Path, said: dict[str, 
 
 
 def test_without_either_there_are_two(tmp_path: Path) -> None:
-    found = source_of(_twin(tmp_path))
+    found = load_source(_twin(tmp_path))
     assert found is not None and "2 separate objects" in found.left_out

@@ -46,7 +46,7 @@ def test_tree_finds_what_comparing_all_pairs_finds() -> None:
     rng = np.random.default_rng(0)
     shapes = (rng.normal(size=(400, 3)) @ rng.normal(size=(3, 66)) * 0.01).astype(np.float32)
     log_sizes = rng.normal(scale=0.1, size=400)
-    first, second, distance, ratio = module._near(shapes, log_sizes, 0.05, np.log(1.05))
+    first, second, distance, ratio = module._near_pairs(shapes, log_sizes, 0.05, np.log(1.05))
     i, j = np.triu_indices(400, 1)
     apart = np.linalg.norm(shapes[i].astype(float) - shapes[j], axis=1)
     near = (apart <= 0.05) & (np.abs(log_sizes[i] - log_sizes[j]) <= np.log(1.05))
@@ -57,7 +57,7 @@ def test_tree_finds_what_comparing_all_pairs_finds() -> None:
 
 
 def test_many_copies_give_few_pairs() -> None:
-    first, *_ = module._near(np.zeros((1000, 66), np.float32), np.zeros(1000), 0.02, 0.05)
+    first, *_ = module._near_pairs(np.zeros((1000, 66), np.float32), np.zeros(1000), 0.02, 0.05)
     assert len(first) <= 1000 * (module.NEIGHBOURS + 1)  # of equal ones, a twin's own row may be the one left out
 
 

@@ -17,7 +17,7 @@ from manitwin.dataset.index.parts import write_part
 from manitwin.formats.glb import write_glb
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.grasp_table import SCHEMA
-from manitwin.twin.store import seal
+from manitwin.twin.store import write_twin_record
 from record_overlay import overlaid
 from rehearsal_cube import CUBE
 
@@ -104,7 +104,7 @@ def make_twin(
     }  # fmt: skip
     record = accepted_record(twin_id, category, source, count, held)
     checks = [{"name": name, "passed": False} for name in failed_checks]
-    seal(folder, {**record, "quality": {"checks": checks}})
+    write_twin_record(folder, {**record, "quality": {"checks": checks}})
     return folder
 
 
@@ -120,7 +120,7 @@ def make_rejected(root: Path, twin_id: str) -> Path:
         "rejection": {"stage": "input", "reason": "empty", "detail": f"{root}/photo.png: empty"},
         "provenance": {"manitwin_version": "0", "config_sha256": "0", "seed": 0, "stages": {}},
     }  # fmt: skip
-    seal(folder, record)
+    write_twin_record(folder, record)
     return folder
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from manitwin.dataset.publish.licences import (
-    Allowed,
+    LicencePolicy,
     Selection,
     hub_license,
     licenses_page,
@@ -28,7 +28,7 @@ for row in ROWS:
 
 
 def select(rows: list[dict[str, Any]], allow: list[str] | None, *, with_rehearsals: bool = False) -> Selection:
-    return select_things("accepted twin", terms_of(rows), Allowed(allow, with_rehearsals))
+    return select_things("accepted twin", terms_of(rows), LicencePolicy(allow, with_rehearsals))
 
 
 @pytest.mark.parametrize(

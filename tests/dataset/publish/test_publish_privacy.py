@@ -11,11 +11,11 @@ import pyarrow.parquet as pq
 import pytest
 from made_twins import index, make_dataset, make_twin
 
-from manitwin.dataset.publish.privacy import check_part, places_of
+from manitwin.dataset.publish.privacy import check_part, local_paths
 from manitwin.dataset.publish.publish import publish_dataset
 from manitwin.errors import TwinError
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.store import read_record, seal
+from manitwin.twin.store import read_record, write_twin_record
 
 
 def texts(name: str, content: bytes) -> list[bytes]:
@@ -75,7 +75,7 @@ def test_folder_of_a_person_in_a_twins_words_is_refused(tmp_path: Path, words: s
 
 
 def test_folder_of_the_data_set_is_found_in_any_part(dataset: Path) -> None:
-    places = places_of([DatasetRoot(dataset)])
+    places = local_paths([DatasetRoot(dataset)])
     with pytest.raises(TwinError, match=r"visual\.glb"):
         check_part("a0", "visual.glb", b"\x00glTF" + str(dataset).encode() + b"/photo.png\xff", places)
     check_part("a0", "source.txt", b"/home/author/mug.mtl", places)
@@ -85,7 +85,7 @@ def test_source_with_a_folder_in_its_name_is_refused(tmp_path: Path) -> None:
     root = tmp_path / "set"
     folder = make_twin(root, "a0")
     record = read_record(folder).model_dump(mode="json", exclude={"revision"})
-    seal(folder, {**record, "source": {**record["source"], "file": "photos/source.zip"}})
+    write_twin_record(folder, {**record, "source": {**record["source"], "file": "photos/source.zip"}})
     index(root)
     with pytest.raises(TwinError, match="not a file name"):
         publish_dataset(root, tmp_path / "out")

@@ -22,7 +22,7 @@ from manitwin.dataset.publish.shard_plan import archive_bytes
 from manitwin.dataset.publish.shards import unpack_shard
 from manitwin.errors import TwinError, UsageError
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
-from manitwin.twin.store import RECORD, read_record, seal
+from manitwin.twin.store import RECORD, read_record, write_twin_record
 
 
 def shards_of(out: Path) -> list[Path]:
@@ -124,7 +124,7 @@ def test_damaged_or_newer_twin_stops_the_publication(tmp_path: Path, what: str) 
         (folder / "card.png").unlink()
     else:
         record = read_record(folder).model_dump(mode="json", exclude={"revision"})
-        seal(folder, {**record, "name": "other"})
+        write_twin_record(folder, {**record, "name": "other"})
     error, words = (UsageError, "manitwin index") if what == "newer" else (TwinError, "card.png")
     with pytest.raises(error, match=words):
         publish_dataset(root, tmp_path / "out")

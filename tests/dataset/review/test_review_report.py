@@ -18,8 +18,8 @@ from manitwin.dataset.review.report import review_report
 from manitwin.dataset.review.store import ReviewStore
 from manitwin.dataset.review.verdicts import DIMENSIONS
 from manitwin.twin.dataset_root import twin_name
-from manitwin.twin.shares import wilson_interval
-from manitwin.twin.store import RECORD, read_record, seal
+from manitwin.twin.proportions import wilson_interval
+from manitwin.twin.store import RECORD, read_record, write_twin_record
 from twin_folders import twin_id, write_accepted, write_set
 
 
@@ -31,7 +31,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         record = json.loads((folder / RECORD).read_text())
         del record["revision"]
         record["points"]["candidates"] = {"positions_m": [[0.0, 0.0, 0.01]] * 4, "normals": [[0.0, 0.0, 1.0]] * 4}
-        seal(folder, record)
+        write_twin_record(folder, record)
     write_index(root, jobs=1)
     return root
 

@@ -7,11 +7,13 @@ from collections import Counter
 import pytest
 
 from manitwin.dataset.review.queues import Plan, queue_of
-from manitwin.dataset.review.sample import Listed, strata_counts, stratified_sample
+from manitwin.dataset.review.sample import SampledTwin, strata_counts, stratified_sample
 from manitwin.errors import UsageError
 
 KINDS = ("mug", "bowl", "pen", "pan")
-SET = [Listed(f"t{n:04d}", KINDS[n % 7 % 4], 0.03 * (1 + n % 11), "mesh" if n % 3 else "image") for n in range(1000)]
+SET = [
+    SampledTwin(f"t{n:04d}", KINDS[n % 7 % 4], 0.03 * (1 + n % 11), "mesh" if n % 3 else "image") for n in range(1000)
+]
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

@@ -90,7 +90,7 @@ def test_undo_goes_back_as_far_as_there_are_reviews_and_keeps_what_was_typed(sto
         assert (None if stands is None else stands.review.answers["category"]) == left
     assert store.draft("ada", "t0") == review("t0", "yes").model_dump(mode="json")
     assert store.undo("ada", "undo 3") is None
-    assert store.undone() == {"ada": 3} and len(store.standing()) == 1
+    assert store.undo_counts() == {"ada": 3} and len(store.standing()) == 1
     store.add([review("t0", "no")], ["again"])
     assert store.draft("ada", "t0") is None and len(store.standing()) == 2
 
@@ -105,7 +105,7 @@ def test_sent_twice_it_counts_once_and_many_or_none(store: ReviewStore) -> None:
 
 def test_a_twin_built_anew_has_verdicts_of_its_own(store: ReviewStore) -> None:
     store.add([review("t0", revision="r0"), review("t0", "no", revision="r1")], ["a", "b"])
-    assert store.judged() == {"t0": {"r0": {"ada"}, "r1": {"ada"}}}
+    assert store.annotators_by_revision() == {"t0": {"r0": {"ada"}, "r1": {"ada"}}}
     assert len(store.standing()) == 2
 
 
@@ -173,10 +173,10 @@ def test_a_verdict_that_makes_no_sense_is_refused(change: dict[str, object], sai
 
 def test_reviews_stand_for_what_followed_the_revision_that_was_seen(store: ReviewStore) -> None:
     store.add([review(revision="r0"), review(annotator="bob", revision="r0")], ["1", "2"])
-    store.follow({"t0": ("r0", "r1")})
-    store.follow({"t0": ("r1", "r2"), "t9": ("r0", "r9")})
+    store.record_successors({"t0": ("r0", "r1")})
+    store.record_successors({"t0": ("r1", "r2"), "t9": ("r0", "r9")})
     assert {stored.review.revision for stored in store.standing()} == {"r2"}
-    assert store.judged() == {"t0": {"r2": {"ada", "bob"}}}
+    assert store.annotators_by_revision() == {"t0": {"r2": {"ada", "bob"}}}
     store.add([review(answer="no", revision="r2")], ["3"])
     told = {stored.review.annotator: stored.review.answers["category"] for stored in store.standing()}
     assert told == {"ada": "no", "bob": "yes"}, "the later of two of one person counts"
@@ -186,8 +186,8 @@ def test_reviews_stand_for_what_followed_the_revision_that_was_seen(store: Revie
 
 def test_revisions_that_follow_each_other_in_a_circle_end(store: ReviewStore) -> None:
     store.add([review(revision="r0")], ["1"])
-    store.follow({"t0": ("r0", "r1")})
-    store.follow({"t0": ("r1", "r0")})
+    store.record_successors({"t0": ("r0", "r1")})
+    store.record_successors({"t0": ("r1", "r0")})
     assert [stored.review.revision for stored in store.standing()] == ["r1"]
 
 

@@ -17,7 +17,7 @@ from manitwin.dataset.review.tuning import best_threshold, sign_test
 from manitwin.dataset.review.verdicts import Review
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
-from manitwin.twin.store import RECORD, read_record, seal
+from manitwin.twin.store import RECORD, read_record, write_twin_record
 from twin_folders import write_set
 
 TWINS = 30
@@ -49,7 +49,7 @@ def reviewed(tmp_path_factory: pytest.TempPathFactory) -> Path:
             {"name": "matte", "passed": True, "value": confidence, "limit": None, "message": ""}
         )
         record["grasps"]["association_radius_m"] = 0.03 + 0.001 * float(rng.random())
-        seal(folder, record)
+        write_twin_record(folder, record)
     write_index(root, jobs=1)
     with ReviewStore(reviews_path(DatasetRoot(str(root)))) as store:
         for path in sorted(root.glob("twins/*/*")):

@@ -5,7 +5,13 @@ from __future__ import annotations
 import pytest
 
 from manitwin.config import GateConfig
-from manitwin.dataset.review.said_words import Words, name_remark, read_side_cm, with_words, words_of
+from manitwin.dataset.review.object_statements import (
+    ObjectStatement,
+    current_statement,
+    name_remark,
+    read_side_cm,
+    with_statement,
+)
 from manitwin.errors import UsageError
 from manitwin.pipeline.human_corrections import CATEGORY, NAME, NAME_STAGES, SIZE, STAGES
 from manitwin.pipeline.item import Item
@@ -20,28 +26,31 @@ def measure(value_m: float) -> dict[str, object]:
 def test_what_was_corrected_before_is_replaced_and_the_rest_stays() -> None:
     before = {stage: {CATEGORY: "cup"} for stage in STAGES[CATEGORY]}
     before["physical"] |= {SIZE: measure(0.2), "mass_kg": measure(0.3)}
-    assert words_of(NAMELESS, before) == Words("cup", "20")
-    after = with_words(before, NAMELESS, Words("mug", "12.5"), "human:ada")
-    assert words_of(NAMELESS, after) == Words("mug", "12.5")
+    assert current_statement(NAMELESS, before) == ObjectStatement("cup", "20")
+    after = with_statement(before, NAMELESS, ObjectStatement("mug", "12.5"), "human:ada")
+    assert current_statement(NAMELESS, after) == ObjectStatement("mug", "12.5")
     assert after["physical"] == {NAME: {"value": "mug", "source": "human:ada"}, "mass_kg": measure(0.3)}
     assert after["mesh"][SIZE]["value"] == 0.125 and set(after) == set(NAME_STAGES)
-    assert with_words(after, NAMELESS, Words(), "human:ada") == {"physical": {"mass_kg": measure(0.3)}}
+    assert with_statement(after, NAMELESS, ObjectStatement(), "human:ada") == {"physical": {"mass_kg": measure(0.3)}}
     assert before["caption"] == {CATEGORY: "cup"}, "what was given is not changed"
 
 
 def test_words_that_an_input_was_given_with_are_no_amendment() -> None:
     item = Item("/photos/a.jpg", name="mug", longest_side_m=1 / 3)
-    assert words_of(item, {}) == Words("mug", "33.3333")
-    assert with_words({}, item, words_of(item, {}), "human:ada") == {}
-    said = with_words({}, item, Words("cup", "12"), "human:ada")
-    assert words_of(item, said) == Words("cup", "12") and with_words(said, item, Words(), "human:ben") == {}
+    assert current_statement(item, {}) == ObjectStatement("mug", "33.3333")
+    assert with_statement({}, item, current_statement(item, {}), "human:ada") == {}
+    said = with_statement({}, item, ObjectStatement("cup", "12"), "human:ada")
+    assert (
+        current_statement(item, said) == ObjectStatement("cup", "12")
+        and with_statement(said, item, ObjectStatement(), "human:ben") == {}
+    )
 
 
 def test_length_where_a_unit_was_stated_is_refused_as_in_a_manifest() -> None:
     item = Item("/photos/a.jpg", name="mug", units="cm", views=("/photos/b.jpg",), poses="/photos/transforms.json")
     with pytest.raises(UsageError, match="the unit cm already determines the size"):
-        with_words({}, item, Words("mug", "12"), "human:ada")
-    assert words_of(item, with_words({}, item, Words("cup", ""), "human:ada")).name == "cup"
+        with_statement({}, item, ObjectStatement("mug", "12"), "human:ada")
+    assert current_statement(item, with_statement({}, item, ObjectStatement("cup", ""), "human:ada")).name == "cup"
 
 
 def test_lengths_are_those_that_the_data_set_takes_things_of() -> None:

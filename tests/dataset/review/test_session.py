@@ -10,9 +10,9 @@ import pytest
 from manitwin.api import write_index
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.review.queues import Plan
+from manitwin.dataset.review.review_subjects import annotation_text, read_twin
 from manitwin.dataset.review.session import ReviewSession
 from manitwin.dataset.review.store import ReviewStore
-from manitwin.dataset.review.twins_seen import read_twin, said_of
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 from twin_folders import write_set
@@ -63,7 +63,7 @@ def test_what_is_left_for_later_is_behind_all_others(made: tuple[Path, list[str]
 
 def test_a_blind_annotator_is_told_a_mass_without_its_interval(made: tuple[Path, list[str]]) -> None:
     record = read_twin(DatasetRoot(made[0]), made[1][0])
-    seen, blind = said_of(record, "physical"), said_of(record, "physical", blind=True)
+    seen, blind = annotation_text(record, "physical"), annotation_text(record, "physical", blind=True)
     assert " to " in seen and " to " not in blind and blind.split(" kg")[0] == seen.split(" kg")[0]
 
 

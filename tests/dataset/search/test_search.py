@@ -13,19 +13,19 @@ from manitwin.cli.main import app
 from manitwin.config import ServicesConfig
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.index.rebuild import rebuild
-from manitwin.dataset.search import twin_looks as drawing
+from manitwin.dataset.search import appearance_vectors as drawing
+from manitwin.dataset.search.appearance_vectors import SPACE, load_appearance_vectors
 from manitwin.dataset.search.question import words
 from manitwin.dataset.search.search import search_picture, search_words, text_vectors
-from manitwin.dataset.search.stored import FOLDER, Stored, VectorStore
-from manitwin.dataset.search.twin_looks import SPACE, twin_looks
-from manitwin.dataset.search.words import described, rank_by_words, unknown_words
+from manitwin.dataset.search.vector_store import FOLDER, StoredVectors, VectorStore
+from manitwin.dataset.search.words import rank_by_words, text_fields, unknown_words
 from manitwin.errors import UsageError
 from manitwin.models.embedders.texts import text_embedder
 from manitwin.render.cameras import framing_camera
 from manitwin.render.renderer import shared_renderer
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from scene_twins import can, slab, write_thing
 from tiny_clip import write_tiny_clip
 
@@ -47,7 +47,7 @@ def _say(folder: Path, number: int, **words: str) -> None:
     record = json.loads((twin / RECORD).read_bytes())
     record["language"] |= words
     del record["revision"], record["files"]
-    seal(twin, record)
+    write_twin_record(twin, record)
 
 
 def revisions(root: DatasetRoot) -> dict[str, str]:
@@ -69,7 +69,7 @@ def test_words_find_what_the_thing_is_before_its_color(root: DatasetRoot) -> Non
 
 
 def test_scores_are_those_of_bm25_by_hand() -> None:
-    texts = [described({"category": word}) | {"aliases": ""} for word in ("xa", "xb", "xb")]
+    texts = [text_fields({"category": word}) | {"aliases": ""} for word in ("xa", "xb", "xb")]
     hits = rank_by_words("xa xb", texts)
     assert [hit.place for hit in hits] == [0, 1, 2]
     # one field of its mean length: weight 6, k1 1.2; rarities log(1 + 2.5/1.5) and log(1 + 1.5/2.5)
@@ -92,7 +92,7 @@ LONGEST_M = [0.09, 0.10, 0.15, 0.08, 0.21, 0.13, 0.17, 0.30]
 
 def on_the_shelf(question: str) -> list[int]:
     """The places of what is found, the best first."""
-    return [hit.place for hit in rank_by_words(question, [described(each) for each in SHELF], LONGEST_M)]
+    return [hit.place for hit in rank_by_words(question, [text_fields(each) for each in SHELF], LONGEST_M)]
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_a_compound_is_found_however_it_is_written() -> None:
 
 
 def test_words_that_no_twin_has_are_told_with_those_spelt_nearly_so() -> None:
-    texts = [described(each) for each in SHELF]
+    texts = [text_fields(each) for each in SHELF]
     assert unknown_words("a red hamer, xylophones and a múg", texts) == {"hamer": ["hammer"], "xylophone": []}
     assert unknown_words("something to drink from", texts) == {}
     assert on_the_shelf("a múg") == on_the_shelf("a mug")
@@ -135,7 +135,7 @@ def test_a_question_of_nothing_but_what_is_unwanted_is_refused() -> None:
 
 def test_words_are_in_the_singular_and_in_one_spelling() -> None:
     assert words("The gray knives for Glasses, berries and brushes") == ["grey", "knife", "glass", "berry", "brush"]
-    assert "unknown" not in described({"category": "mug", "color": "unknown color (untextured)"})["color"]
+    assert "unknown" not in text_fields({"category": "mug", "color": "unknown color (untextured)"})["color"]
 
 
 class Embedder:
@@ -199,26 +199,28 @@ def test_looks_are_made_again_for_another_surface_alone(tmp_path: Path, monkeypa
     monkeypatch.setattr(drawing, "AROUND", 1)
     root, drawn = DatasetRoot(tmp_path), list[str]()
     twin_id = write_thing(tmp_path, 0, can())
-    before = dict(twin_looks(root, revisions(root), drawn.append))[twin_id]
+    before = dict(load_appearance_vectors(root, revisions(root), drawn.append))[twin_id]
     file = tmp_path / VectorStore(root, SPACE).file(twin_id)
     content = file.read_bytes()
     file.unlink()
-    assert (dict(twin_looks(root, revisions(root), drawn.append))[twin_id] == before).all()
+    assert (dict(load_appearance_vectors(root, revisions(root), drawn.append))[twin_id] == before).all()
     assert file.read_bytes() == content and len(drawn) == 2
     _say(tmp_path, 0, caption="Another sentence.")
-    dict(twin_looks(root, revisions(root), drawn.append))
+    dict(load_appearance_vectors(root, revisions(root), drawn.append))
     assert len(drawn) == 2, "a sentence changes no look"
     file.write_bytes(content[:-9])
-    dict(twin_looks(root, revisions(root), drawn.append))
+    dict(load_appearance_vectors(root, revisions(root), drawn.append))
     assert len(drawn) == 3, "a file that was cut off is made again"
     write_thing(tmp_path, 0, slab("can", 0.1, 0.1, 0.02))
-    after = dict(twin_looks(root, revisions(root), drawn.append))[twin_id]
+    after = dict(load_appearance_vectors(root, revisions(root), drawn.append))[twin_id]
     assert len(drawn) == 4 and (after != before).any()
 
 
 def test_a_store_gives_back_what_it_was_given_and_refuses_other_lengths(tmp_path: Path) -> None:
     root = DatasetRoot(tmp_path)
-    kept = VectorStore(root, "space").write("ab12", Stored("r", "c", np.array([[0.25, 0.5], [1.0, -2.0]], np.float32)))
+    kept = VectorStore(root, "space").write(
+        "ab12", StoredVectors("r", "c", np.array([[0.25, 0.5], [1.0, -2.0]], np.float32))
+    )
     again = VectorStore(root, "space", 2).read("ab12")
     assert again is not None and (again.revision, again.content) == ("r", "c")
     assert (again.vectors == kept.vectors).all()
@@ -229,12 +231,12 @@ def test_a_store_gives_back_what_it_was_given_and_refuses_other_lengths(tmp_path
 
 def test_pictures_want_a_local_data_set() -> None:
     with pytest.raises(UsageError, match="copy the data set"):
-        dict(twin_looks(DatasetRoot("memory://nowhere"), {"ab12": "r"}))
+        dict(load_appearance_vectors(DatasetRoot("memory://nowhere"), {"ab12": "r"}))
 
 
 def test_a_part_is_found_and_left_out_by_what_points_are_called() -> None:
     rows = [{"category": "mug", "parts": "rim handle"}, {"category": "mug", "parts": "rim"}]
-    texts = [described(row) for row in rows]
+    texts = [text_fields(row) for row in rows]
     assert [hit.place for hit in rank_by_words("a mug without a handle", texts)] == [1]
     assert [hit.place for hit in rank_by_words("a mug with a handle", texts)] == [0, 1]
 

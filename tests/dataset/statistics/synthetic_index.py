@@ -7,7 +7,7 @@ import hashlib
 import numpy as np
 import pyarrow as pa
 
-from manitwin.dataset.index.tables import DESCRIPTOR_LENGTH, TABLES, joined
+from manitwin.dataset.index.tables import DESCRIPTOR_LENGTH, TABLES, concatenate_tables
 from manitwin.twin.record import REJECTION_REASONS
 
 CATEGORIES = ("mug", "bottle", "hammer", "spoon", "box", "banana", "stapler", "toy", "bowl", "screwdriver")
@@ -227,4 +227,4 @@ def _whole(name: str, table: pa.Table) -> pa.Table:
     """Return a table with all columns of the index, in its order: NULL in those that no statistics look at."""
     schema = TABLES[name]
     columns = [table[f.name] if f.name in table.column_names else pa.nulls(len(table), f.type) for f in schema]
-    return joined(name, [pa.table(columns, names=schema.names).cast(schema)])
+    return concatenate_tables(name, [pa.table(columns, names=schema.names).cast(schema)])

@@ -17,7 +17,7 @@ from manitwin.dataset.index.part_list import PartList
 from manitwin.dataset.index.parts import write_rows
 from manitwin.dataset.statistics.page import FIGURES, FOLDER, NUMBERS, REPORT
 from manitwin.dataset.statistics.query import ReportTables
-from manitwin.dataset.statistics.report import collect, write_dataset_report
+from manitwin.dataset.statistics.report import run_queries, write_dataset_report
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -37,8 +37,8 @@ def dataset(url: str, accepted: int, rejected: int, parts: int) -> DatasetRoot:
 
 
 def test_numbers_do_not_depend_on_how_rows_are_spread_over_parts(tmp_path: Path) -> None:
-    one = collect(ReportTables.of_index(dataset(str(tmp_path / "one"), 40, 15, parts=1)))
-    many = collect(ReportTables.of_index(dataset(str(tmp_path / "many"), 40, 15, parts=5)))
+    one = run_queries(ReportTables.of_index(dataset(str(tmp_path / "one"), 40, 15, parts=1)))
+    many = run_queries(ReportTables.of_index(dataset(str(tmp_path / "many"), 40, 15, parts=5)))
     assert {name: result.rows for name, result in one.items()} == {name: result.rows for name, result in many.items()}
     assert one["totals"].only["items"] == 55
 

@@ -19,7 +19,7 @@ from manitwin.config import RunConfig
 from manitwin.engine.drive import drive
 from manitwin.engine.executors import local as local_module
 from manitwin.engine.executors.local import LocalExecutor
-from manitwin.engine.executors.local_worker import LastWords
+from manitwin.engine.executors.local_worker import CrashReport
 from manitwin.engine.jobs import Failure, Job, Reply, RunStage, StageRejected, WorkerSetup
 from manitwin.engine.stage_runner import StageRun
 from manitwin.engine.task import Task
@@ -85,7 +85,7 @@ def test_an_item_that_is_too_large_is_rejected_in_a_run_of_processes(tmp_path: P
 def test_programs_of_a_stage_are_not_limited_by_its_memory() -> None:
     program = """
 import resource, subprocess, sys
-from manitwin.engine.process_bounds import limit_memory
+from manitwin.engine.process_limits import limit_memory
 from manitwin.models.generators import supervisor
 before = resource.getrlimit(resource.RLIMIT_DATA)
 limit_memory(1.5)
@@ -189,17 +189,17 @@ def test_workers_that_never_start_are_said_once(tmp_path: Path, monkeypatch: pyt
 
 
 def test_last_words_tell_memory_from_a_crash(tmp_path: Path) -> None:
-    assert LastWords.read(tmp_path, 1) == LastWords()
+    assert CrashReport.from_stack_file(tmp_path, 1) == CrashReport()
     (tmp_path / "2.txt").write_text(
         'LLVM ERROR: out of memory\nFatal Python error: Aborted\n\n  File "a.py", line 1 in f\n'
     )
-    words = LastWords.read(tmp_path, 2)
-    assert words == LastWords("LLVM ERROR: out of memory", 'File "a.py", line 1 in f', no_memory=True)
+    words = CrashReport.from_stack_file(tmp_path, 2)
+    assert words == CrashReport("LLVM ERROR: out of memory", 'File "a.py", line 1 in f', no_memory=True)
     (tmp_path / "3.txt").write_text("\x1b[31mfree(): invalid pointer\nFatal Python error: Aborted\n")
-    words = LastWords.read(tmp_path, 3)
+    words = CrashReport.from_stack_file(tmp_path, 3)
     assert not words.no_memory and "invalid pointer" in words.said and "\x1b" not in words.said
     (tmp_path / "4.txt").write_text("Fatal Python error: Segmentation fault\nout of memory\n")
-    assert not LastWords.read(tmp_path, 4).no_memory, "what stands in a stack is no cause"
+    assert not CrashReport.from_stack_file(tmp_path, 4).no_memory, "what stands in a stack is no cause"
 
 
 def test_a_crash_names_stage_item_and_signal_and_the_run_goes_on(tmp_path: Path) -> None:

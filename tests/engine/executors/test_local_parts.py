@@ -10,10 +10,10 @@ from manitwin.config import RunConfig
 from manitwin.engine.drive import drive
 from manitwin.engine.events import Announcer, StageAdvanced, StageEnded, StageEvent, StageStarted
 from manitwin.engine.executors.local import LocalExecutor
-from manitwin.engine.executors.stage_notes import parts_noted, read_notes
+from manitwin.engine.executors.stage_progress import read_notes, write_progress_notes
 from manitwin.engine.flight import Flight
 from manitwin.engine.jobs import Failure, RunStage, WorkerSetup
-from manitwin.engine.stage import StagePart, heard_by, tell_part
+from manitwin.engine.stage import StagePart, progress_listener, report_progress
 from manitwin.engine.task import Task
 from manitwin.pipeline.item import Item
 from manitwin.twin.dataset_root import DatasetRoot
@@ -67,8 +67,8 @@ def test_a_note_that_cannot_be_written_does_not_end_the_stage(tmp_path: Path, ca
     gone = tmp_path / "gone"
     done = []
     for ticket in (1, 2):
-        with parts_noted(gone, ticket):
-            tell_part(1, 2, "things")
+        with write_progress_notes(gone, ticket):
+            report_progress(1, 2, "things")
             done.append(ticket)
     assert done == [1, 2]
     assert len([record for record in caplog.records if "not shown" in record.message]) == 1, "it is said once"
@@ -76,8 +76,8 @@ def test_a_note_that_cannot_be_written_does_not_end_the_stage(tmp_path: Path, ca
 
 def test_parts_are_heard_only_where_somebody_listens() -> None:
     heard: list[StagePart] = []
-    tell_part(1, 3, "frames")
-    with heard_by(heard.append):
-        tell_part(2, 3, "frames")
-    tell_part(3, 3, "frames")
+    report_progress(1, 3, "frames")
+    with progress_listener(heard.append):
+        report_progress(2, 3, "frames")
+    report_progress(3, 3, "frames")
     assert heard == [StagePart(2, 3, "frames")]

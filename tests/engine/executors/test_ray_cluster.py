@@ -127,9 +127,9 @@ def test_without_ray_the_remedy_is_said(
 
 
 def test_addresses_where_nobody_answers_are_refused_at_once() -> None:
-    from manitwin.engine.executors.ray_cluster import reachable
+    from manitwin.engine.executors.ray_cluster import check_head_address
 
     with pytest.raises(UsageError, match="host:port"):
-        reachable("ray://head:10001")
+        check_head_address("ray://head:10001")
     with pytest.raises(Unavailable, match=r"no Ray cluster answers at 127\.0\.0\.1:9"):
-        reachable("127.0.0.1:9")
+        check_head_address("127.0.0.1:9")

@@ -16,7 +16,7 @@ from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.ledger.reading import read_ledger
 from manitwin.engine.task import Payload
 from manitwin.episodes.batch import Batch
-from manitwin.episodes.episode_pictures import BatchDrawing
+from manitwin.episodes.episode_pictures import BatchRendering
 from manitwin.pipeline.item import Item
 from manitwin.scenes.layouts.layouts_recipe import LayoutNumber
 from manitwin.twin.dataset_root import DatasetRoot
@@ -68,7 +68,7 @@ RECIPE = RehearsedRecipe()
     [
         (("layout 0", "layout 17"), (LayoutNumber(0), LayoutNumber(17))),
         (BATCH_TEXTS, BATCHES),
-        (("0123", "4567"), (BatchDrawing("0123"), BatchDrawing("4567"))),
+        (("0123", "4567"), (BatchRendering("0123"), BatchRendering("4567"))),
         (("a mug", "layout 17"), (Item(None, "a mug"), Item(None, "layout 17"))),
     ],
 )
@@ -78,7 +78,7 @@ def test_what_was_a_text_is_the_same_item_now(
     path = tmp_path / "ledger.sqlite"
     write_earlier(path, texts)
     ledger = Ledger(path)
-    ledger.restate(type(payloads[0]).from_json)
+    ledger.rewrite_payloads(type(payloads[0]).from_json)
     assert ledger.add_items(payloads) == ([1, 2], 0), "nothing is new"
     opened = [type(payloads[0]).from_json(each.payload) for each in ledger.next_open(0, 10)]
     assert opened == list(payloads)

@@ -109,7 +109,7 @@ def test_progress_counts_rate_time_left_and_reasons(path: Path, ledger: Ledger) 
     assert progress.cpu_seconds == pytest.approx(7.5) and progress.last_run == "at work"
     assert progress.of_another_recipe == 0
     ledger.end_run(run, "finished")
-    assert ledger.not_indexed(10) == [f"{n:016x}" for n in (1, 2, 3, 4)], "a failed item has no folder"
+    assert ledger.unindexed_ids(10) == [f"{n:016x}" for n in (1, 2, 3, 4)], "a failed item has no folder"
     ledger.begin_run("of a newer version", given=[1])
     ledger.commit()
     with read_ledger(path) as connection:

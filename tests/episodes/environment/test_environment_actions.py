@@ -15,7 +15,7 @@ import pytest
 from grasped_twins import write_brick
 from manitwin.episodes.environment.action_limits import checked_action
 from manitwin.episodes.environment.environment import TaskEnvironment
-from manitwin.episodes.environment.make import make_env
+from manitwin.episodes.environment.environment_factory import make_env
 from manitwin.episodes.recording import RATE_HZ
 from manitwin.episodes.settings import TasksConfig
 from manitwin.episodes.tasks.task_files import read_tasks

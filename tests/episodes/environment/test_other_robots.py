@@ -17,7 +17,7 @@ from manitwin.episodes.episodes_run import make_episodes
 from manitwin.episodes.planning.two_arms import planner_of
 from manitwin.episodes.recording import tip_poses
 from manitwin.episodes.settings import TasksConfig, TrajectoriesConfig
-from manitwin.episodes.skills.hands import skills_of
+from manitwin.episodes.skills.robot_compatibility import skills_of
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.tasks.task_files import read_tasks
 from manitwin.episodes.tasks.tasks_run import make_tasks

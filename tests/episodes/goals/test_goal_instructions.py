@@ -7,8 +7,8 @@ import re
 import pytest
 
 from manitwin.episodes.goals.goal import SIGNATURES, Goal, Literal
-from manitwin.episodes.goals.goal_instructions import FIXTURES, TEMPLATES, goal_instructions, tells_fixture
-from manitwin.episodes.tasks.phrasings import task_instructions
+from manitwin.episodes.goals.goal_instructions import FIXTURES, TEMPLATES, goal_instructions, is_fixture_unambiguous
+from manitwin.episodes.tasks.task_instructions import task_instructions
 from manitwin.twin.record import Language
 
 OF_ONE = {"upright", "lifted", "pressed", "handed_over"}
@@ -77,9 +77,9 @@ def test_a_statement_is_not_joined_to_another_instruction() -> None:
     [("wiped", "cutting board"), ("inserted", "pen holder"), ("hung", "coat hook"), ("struck", "block of wood")],
 )
 def test_a_fixture_that_an_object_may_be_called_is_not_told_from_it(predicate: str, other: str) -> None:
-    assert not tells_fixture(predicate, ["mug", other])
-    assert tells_fixture(predicate, ["mug", "marker", "circuit board"])
-    assert tells_fixture("lifted", ["mug", other])
+    assert not is_fixture_unambiguous(predicate, ["mug", other])
+    assert is_fixture_unambiguous(predicate, ["mug", "marker", "circuit board"])
+    assert is_fixture_unambiguous("lifted", ["mug", other])
 
 
 def test_what_the_templates_call_fixtures_is_what_is_looked_for() -> None:

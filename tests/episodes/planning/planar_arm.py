@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.geometry.poses import transform
-from manitwin.robots.grippers.gripper import load_gripper, of_kind
+from manitwin.robots.grippers.gripper import load_gripper, require_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.robot import Robot, Workspace
 
@@ -32,7 +32,7 @@ def planar_arm(kind: str = "revolute", limit_rad: float = 3.0) -> Robot:
         finger_joints=("f1", "f2"),
         tip_link="c",
         gripper_to_tip=transform(along_x, np.array([LENGTHS_M[2], 0, 0])),
-        gripper=of_kind(load_gripper("panda"), ParallelGripper),
+        gripper=require_kind(load_gripper("panda"), ParallelGripper),
         hand_links=("c",),
         finger_links=("left", "right"),
         disabled_pairs=(("base", "a"), ("a", "b"), ("b", "c"), ("c", "left"), ("c", "right"), ("left", "right")),

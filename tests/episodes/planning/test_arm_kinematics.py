@@ -7,7 +7,7 @@ from mujoco_witness import simulated_urdf
 from planar_arm import LENGTHS_M, planar_arm
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
-from manitwin.episodes.planning.arm_solutions import KnownPoses
+from manitwin.episodes.planning.arm_solutions import SampledPoses
 from manitwin.geometry.poses import rotation_angle_rad, transform
 from manitwin.robots.load import load_robot
 
@@ -46,7 +46,7 @@ def test_gripper_is_where_mujoco_has_it(name):
 @pytest.mark.parametrize("name", ["panda", "ur5_panda"])
 def test_inverse_kinematics_returns_to_the_pose_within_the_limits(name):
     arm = ArmKinematics(load_robot(name))
-    known, rng = KnownPoses(arm), np.random.default_rng(2)
+    known, rng = SampledPoses(arm), np.random.default_rng(2)
     found = 0
     for angles in arm.home + rng.normal(0, 0.4, (60, arm.joints)):
         pose = arm.gripper_pose(np.clip(angles, arm.lower, arm.upper))
@@ -66,8 +66,8 @@ def test_pose_beyond_the_arm_has_no_solution_and_is_known_to_be_out_of_reach():
     arm = ArmKinematics(load_robot("panda"))
     far = transform(np.diag([1.0, -1, -1]), np.array([1.2, 0, 0.2]))
     assert arm.inverse(far, arm.home) is None
-    assert KnownPoses(arm).out_of_reach(far)
-    assert not KnownPoses(arm).out_of_reach(arm.gripper_pose(arm.home))
+    assert SampledPoses(arm).is_out_of_reach(far)
+    assert not SampledPoses(arm).is_out_of_reach(arm.gripper_pose(arm.home))
 
 
 def test_joint_that_turns_twice_is_kept_to_one_turn_about_home():

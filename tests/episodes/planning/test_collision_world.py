@@ -13,7 +13,7 @@ from manitwin.episodes.planning.convex_shapes import ShapeStore
 from manitwin.episodes.planning.kinematic_body import floating_hand_of
 from manitwin.episodes.planning.problem import Phase, PlannerSettings
 from manitwin.geometry.poses import inverse, transform
-from manitwin.geometry.rigid_body import PlacedObject, StaticBox, stands_for_a_plane
+from manitwin.geometry.rigid_body import PlacedObject, StaticBox, is_plane_equivalent
 from manitwin.robots.load import load_robot
 
 SETTINGS = PlannerSettings()
@@ -121,7 +121,7 @@ def test_the_plane_that_a_table_stands_for_goes_on_beside_it(arm):
     small = StaticBox("table", np.array([0.35, 0.35, 0.05]), transform(translation=np.array([0.35, 0, -0.05])))
     raised = StaticBox("shelf", np.array([0.35, 0.35, 0.05]), transform(translation=np.array([0.35, 0, 0.05])))
     narrow = StaticBox("board", np.array([0.35, 0.2, 0.05]), transform(translation=np.array([0.35, 0, -0.05])))
-    assert [stands_for_a_plane(box) for box in (small, raised, narrow, TABLE)] == [True, False, False, True]
+    assert [is_plane_equivalent(box) for box in (small, raised, narrow, TABLE)] == [True, False, False, True]
     beside = transform(np.diag([1.0, -1, -1]), np.array([0.45, 0.55, 0.0834]))  # the fingertips 3 cm below the top
     for boxes, is_free in (((small,), False), ((raised,), True), ((narrow,), True)):
         world = world_of(arm, problem(standing(0.5, 0.1), standing(0.5, -0.1), boxes=boxes))

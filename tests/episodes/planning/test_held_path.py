@@ -36,7 +36,7 @@ def to(x_m: float) -> HeldPath:
 @pytest.fixture(scope="module")
 def tight_x_m(parts: ArmPlanning, beside_a_wall) -> float:
     """Where the hand is between 1 mm and the spare room away from the wall."""
-    world = parts.world_of(beside_a_wall, beside_a_wall.target.object_to_world)
+    world = parts.problem_world(beside_a_wall, beside_a_wall.target.object_to_world)
     world.hold(above(0.08))
 
     def fits(x_m: float, spare_m: float) -> bool:
@@ -64,7 +64,7 @@ def test_a_path_with_room_to_spare_is_taken_before_a_tight_one(parts, beside_a_w
 
 
 def test_spare_room_is_asked_of_the_arm_and_not_of_what_it_holds(parts, beside_a_wall) -> None:
-    world = parts.world_of(beside_a_wall, beside_a_wall.target.object_to_world)
+    world = parts.problem_world(beside_a_wall, beside_a_wall.target.object_to_world)
     lying = standing(0.45, -0.2, z_m=0.004) @ above(0.08)
     world.hold(above(0.08))
     q = parts.arm.inverse(lying, parts.arm.home)
@@ -74,7 +74,10 @@ def test_spare_room_is_asked_of_the_arm_and_not_of_what_it_holds(parts, beside_a
 
 
 def test_where_the_hand_alone_is_in_the_way_no_joints_are_sought_and_none_would_serve(parts, beside_a_wall) -> None:
-    world, knots = parts.world_of(beside_a_wall, beside_a_wall.target.object_to_world), HeldKnots(parts, Phase.CARRY)
+    world, knots = (
+        parts.problem_world(beside_a_wall, beside_a_wall.target.object_to_world),
+        HeldKnots(parts, Phase.CARRY),
+    )
     world.hold(above(0.08))
     told = set[bool]()
     for x_m in np.arange(0.35, 0.62, 0.01):

@@ -15,7 +15,7 @@ from manitwin.episodes.planning.convex_shapes import ShapeStore
 from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.held_path import HeldPathPlanner, HeldPlan
 from manitwin.episodes.planning.kinematic_body import floating_hand_of
-from manitwin.episodes.planning.level_space import LEVEL_RAD, LevelSpace, kept_level
+from manitwin.episodes.planning.level_space import LEVEL_RAD, LevelSpace, must_stay_level
 from manitwin.episodes.planning.motions import Motions
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Motion, Phase, PlannerSettings
@@ -64,8 +64,8 @@ def test_a_motion_through_it_stays_level_where_another_one_does_not(carried) -> 
     motions, arm, world, space, (start, goal), grasp = carried
     tilted = 0
     for seed in range(6):
-        free = motions.free(world, Phase.CARRY, start, goal, np.random.default_rng(seed))
-        level = motions.free(space, Phase.CARRY, start, goal, np.random.default_rng(seed))
+        free = motions.plan_free(world, Phase.CARRY, start, goal, np.random.default_rng(seed))
+        level = motions.plan_free(space, Phase.CARRY, start, goal, np.random.default_rng(seed))
         assert isinstance(free, Motion)
         assert isinstance(level, Motion), level
         tilted += tilts_rad(arm, free.positions_rad, grasp).max() > MOST_RAD
@@ -126,9 +126,9 @@ def test_what_is_carried_level_stands_tall_or_opens_upward() -> None:
     flat = body(box_hull((0.08, 0.08, 0.025), (0, 0, 0.025)))
     over = transform(np.diag([1.0, -1, -1]), np.array([0, 0, 0.05]))
     stands, turned = PlacedObject("bowl", "t", flat, standing(0.4, 0.1, 0.7)), PlacedObject("bowl", "t", flat, over)
-    assert kept_level(stands, bowl)
-    assert not kept_level(turned, bowl)
-    assert not kept_level(stands, None)
+    assert must_stay_level(stands, bowl)
+    assert not must_stay_level(turned, bowl)
+    assert not must_stay_level(stands, None)
     lying = transform(np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]), np.array([0.4, 0, 0.02]))
-    assert kept_level(PlacedObject("brick", "t", brick(), standing(0.4, 0.1)), None)
-    assert not kept_level(PlacedObject("brick", "t", brick(), lying), None)
+    assert must_stay_level(PlacedObject("brick", "t", brick(), standing(0.4, 0.1)), None)
+    assert not must_stay_level(PlacedObject("brick", "t", brick(), lying), None)

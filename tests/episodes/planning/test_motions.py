@@ -70,7 +70,7 @@ def test_carry_over_a_wall_keeps_everything_apart_where_the_straight_way_does_no
     world.arm.enter(Phase.CARRY)
     assert not is_segment_free(start, goal, world.arm.is_free, 0.02)
     motions = Motions(robot, arm, 1 / 240, SETTINGS)
-    motion = motions.free(world.arm, Phase.CARRY, start, goal, np.random.default_rng(0))
+    motion = motions.plan_free(world.arm, Phase.CARRY, start, goal, np.random.default_rng(0))
     assert isinstance(motion, Motion)
     assert (motion.positions_rad[[0, -1]] == np.array([start, goal])).all()
     witness = Witness(robot, some)
@@ -86,7 +86,7 @@ def test_carry_over_a_wall_keeps_everything_apart_where_the_straight_way_does_no
 def test_work_is_counted_so_that_no_way_ends_in_no_path(robot, arm, over_the_wall):
     _, world, _, (start, goal) = over_the_wall
     motions = Motions(robot, arm, 1 / 240, PlannerSettings(iterations=0))
-    assert motions.free(world.arm, Phase.CARRY, start, goal, np.random.default_rng(0)) == "no_path"
+    assert motions.plan_free(world.arm, Phase.CARRY, start, goal, np.random.default_rng(0)) == "no_path"
 
 
 def test_line_through_the_table_is_refused(robot, arm):
@@ -96,6 +96,6 @@ def test_line_through_the_table_is_refused(robot, arm):
     start = arm.inverse(transform(np.diag([1.0, -1, -1]), np.array([0.45, 0, 0.25])), arm.home)
     down = arm.gripper_pose(start)
     down[2, 3] = 0.12
-    assert motions.line(world.arm, Phase.APPROACH, start, down) is not None
+    assert motions.plan_line(world.arm, Phase.APPROACH, start, down) is not None
     down[2, 3] = 0.11  # fingertips end 0.1127 m below the frame
-    assert motions.line(world.arm, Phase.APPROACH, start, down) is None
+    assert motions.plan_line(world.arm, Phase.APPROACH, start, down) is None

@@ -208,5 +208,5 @@ def test_placement_into_another_object_is_refused(planner, among_others):
 def test_reachable_share_counts_grasps_and_not_turns(planner):
     bad = Grasp("inside the table", above(-0.02), 0.04)
     some = problem(standing(0.5, 0.2), standing(0.5, -0.2), grasps=(bad, *grasps_from_above(0.08, 0.075, 0.07)))
-    assert planner.reachable(some) == 0.75
-    assert planner.reachable(problem(standing(1.5, 0.2), standing(0.5, -0.2))) == 0.0
+    assert planner.reachable_share(some) == 0.75
+    assert planner.reachable_share(problem(standing(1.5, 0.2), standing(0.5, -0.2))) == 0.0

@@ -10,13 +10,13 @@ import pytest
 from brick_episodes import TABLE
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.planning import put_down
+from manitwin.episodes.grasp_stability import LEAST_APART_M
+from manitwin.episodes.planning import placement_choice
+from manitwin.episodes.planning.grasp_pairs import TwoHands
 from manitwin.episodes.planning.placement import Placement
+from manitwin.episodes.planning.placement_choice import HeldGrasp, PlacementChoice
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
-from manitwin.episodes.planning.put_down import Held, PutDown
 from manitwin.episodes.planning.two_arms import TwoArmPlanner
-from manitwin.episodes.planning.two_hands import TwoHands
-from manitwin.episodes.steady_grasps import LEAST_APART_M
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.load import load_robot
@@ -53,27 +53,29 @@ def hands() -> TwoHands:
 
 
 def test_a_hand_finds_room_beside_another_or_against_it_but_not_in_its_place() -> None:
-    found = hands().beside(problem(), GIVER.gripper_to_object)
+    found = hands().taker_grasps(problem(), GIVER.gripper_to_object)
     names = list(dict.fromkeys(held.grasp.grasp_id for held in found))
     assert names == ["opposite", "far"], "5 cm beside it two hands from one side overlap, from two sides they do not"
     assert LEAST_APART_M == 0.04
-    assert len(hands().turned((FAR,), GIVER.gripper_to_object)) == 2
-    assert hands().turned((NEARER,), GIVER.gripper_to_object) == []
+    assert len(hands().apart_grasps((FAR,), GIVER.gripper_to_object)) == 2
+    assert hands().apart_grasps((NEARER,), GIVER.gripper_to_object) == []
 
 
 def test_givers_beside_which_nothing_is_far_enough_are_left_out() -> None:
     alone = replace(problem(), grasps=(GIVER, NEARER))
-    assert hands().givers(alone) == ()
-    assert hands().givers(replace(problem(), grasps=(GIVER, NEARER, FAR)))[0] is GIVER  # its middle is that of the bar
+    assert hands().giver_grasps(alone) == ()
+    assert (
+        hands().giver_grasps(replace(problem(), grasps=(GIVER, NEARER, FAR)))[0] is GIVER
+    )  # its middle is that of the bar
 
 
 def test_neither_hand_holds_by_a_corner_and_what_is_too_heavy_for_one_hand_is_not_handed_over() -> None:
     corner = replace(FAR, grasp_id="corner", gripper_to_object=above([0, 0.146, 0.02], DOWN))
     asked = replace(problem(), grasps=(GIVER, FAR, corner))
-    assert {each.grasp_id for each in hands().givers(asked)} == {"giver", "far"}
-    assert {held.grasp.grasp_id for held in hands().beside(asked, GIVER.gripper_to_object)} == {"far"}
+    assert {each.grasp_id for each in hands().giver_grasps(asked)} == {"giver", "far"}
+    assert {held.grasp.grasp_id for held in hands().taker_grasps(asked, GIVER.gripper_to_object)} == {"far"}
     heavy = box([0.03, 0.3, 0.03], 1.0, center_m=(0, 0, 0))  # its end weighs 1.2 Nm about the jaws
-    assert hands().givers(replace(problem(heavy), grasps=(GIVER, FAR))) == ()
+    assert hands().giver_grasps(replace(problem(heavy), grasps=(GIVER, FAR))) == ()
 
 
 def placed(measured: np.ndarray) -> tuple[np.ndarray, Placement] | None:
@@ -81,8 +83,8 @@ def placed(measured: np.ndarray) -> tuple[np.ndarray, Placement] | None:
     asked = problem()
     taker = arms().taker
     goal = transform(None, np.array([0.75, 0.1, 0.016]))
-    held = Held(GIVER, GIVER.gripper_to_object)
-    found = PutDown(taker, arms().with_giver_at(asked, arms().arm.home), [goal])
+    held = HeldGrasp(GIVER, GIVER.gripper_to_object)
+    found = PlacementChoice(taker, arms().with_giver_at(asked, arms().arm.home), [goal])
     return found.plan(arms().with_giver_at(asked, arms().arm.home), held, taker.arm.home, measured)
 
 
@@ -92,15 +94,15 @@ def test_what_has_turned_in_the_hand_is_put_down_as_there_is_room(monkeypatch: p
     turned = turned @ transform(None, np.array([0, 0, -0.1034]))
     assert placed(GIVER.gripper_to_object) is not None
     assert placed(turned) is not None
-    monkeypatch.setattr(put_down, "goals_after_slip", lambda _, goal, *__: [goal])
+    monkeypatch.setattr(placement_choice, "goals_after_slip", lambda _, goal, *__: [goal])
     assert placed(turned) is None
 
 
 def test_as_a_last_resort_all_places_with_room_are_planned_for(monkeypatch: pytest.MonkeyPatch) -> None:
     asked, taker = problem(), arms().taker
     goals = [transform(None, np.array([0.75, y_m, 0.016])) for y_m in np.linspace(-0.15, 0.15, 7)]
-    held = Held(GIVER, GIVER.gripper_to_object)
-    at = PutDown(taker, arms().with_giver_at(asked, arms().arm.home), goals)
+    held = HeldGrasp(GIVER, GIVER.gripper_to_object)
+    at = PlacementChoice(taker, arms().with_giver_at(asked, arms().arm.home), goals)
     plan_place, tried = taker.plan_place, list[np.ndarray]()
 
     def only_the_last(*given: object) -> Placement | None:
@@ -110,7 +112,7 @@ def test_as_a_last_resort_all_places_with_room_are_planned_for(monkeypatch: pyte
     monkeypatch.setattr(taker, "plan_place", only_the_last)
     where = arms().with_giver_at(asked, arms().arm.home), held, taker.arm.home, held.gripper_to_object
     assert at.plan(*where) is None
-    assert len(tried) == put_down.MOST_PLANNED
-    found = at.plan(*where, put_down.PLACES)
+    assert len(tried) == placement_choice.MOST_PLANNED
+    found = at.plan(*where, placement_choice.PLACES)
     assert found is not None
     assert found[0] is goals[-1]

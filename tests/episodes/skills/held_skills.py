@@ -78,7 +78,7 @@ def around(body: RigidBody, frames: tuple[TwinFrame, ...], x_m: float, y_m: floa
 
 def goal_of(skill: str, surroundings: Surroundings, seed: int = 1) -> SkillGoal:
     """The skill's goal, its fixtures standing where the seed has them."""
-    goal = SKILLS[skill].set_goal(surroundings, 0, None, np.random.default_rng(seed))
+    goal = SKILLS[skill].sample_goal(surroundings, 0, None, np.random.default_rng(seed))
     assert goal is not None
     return goal
 

@@ -12,7 +12,7 @@ from manitwin.episodes.pick_place_tasks import PlacingArea
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import SKILLS
-from manitwin.episodes.skills.skill import SkillGoal, Surroundings, set_goal
+from manitwin.episodes.skills.skill import SkillGoal, Surroundings, sample_skill_goal
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.scenes.layouts.pool import Pool, StandingPose
@@ -47,7 +47,7 @@ def around(*objects: PlacedObject, pool: Pool = POOL) -> Surroundings:
 def goal_of(skill: str, surroundings: Surroundings, seed: int = 1) -> SkillGoal | None:
     """The skill's goal for the first object, and the second where it has a partner."""
     chosen = SKILLS[skill]
-    return set_goal(chosen, surroundings, 0, 1 if chosen.has_partner else None, np.random.default_rng(seed))
+    return sample_skill_goal(chosen, surroundings, 0, 1 if chosen.has_partner else None, np.random.default_rng(seed))
 
 
 def attempt(

@@ -13,7 +13,7 @@ from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import SkillGoal, Surroundings
-from manitwin.geometry.frames.words import aims, grip_rank
+from manitwin.geometry.frames.label_keywords import grip_rank, is_aiming_label
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
@@ -47,7 +47,7 @@ def spot() -> Surroundings:
 
 
 def goal() -> SkillGoal:
-    found = SKILLS["aim"].set_goal(spot(), 0, 1, np.random.default_rng(1))
+    found = SKILLS["aim"].sample_goal(spot(), 0, 1, np.random.default_rng(1))
     assert found is not None
     return found
 
@@ -87,7 +87,7 @@ def test_another_side_does_not_aim() -> None:
 
 @pytest.mark.parametrize(("label", "told"), [("nozzle", True), ("lens", True), ("lenses", False), ("handle", False)])
 def test_what_points_is_told_by_its_name(label: str, told: bool) -> None:
-    assert aims(label) == told
+    assert is_aiming_label(label) == told
 
 
 def test_a_trigger_is_held_before_a_handle() -> None:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.registry import SKILLS
-from manitwin.geometry.frames.words import cuts
+from manitwin.geometry.frames.label_keywords import is_cutting_edge
 from manitwin.geometry.poses import transform
 from manitwin.scenes.layouts.twin_frames import TwinFrame
 from rigid_boxes import above, block, box
@@ -69,9 +69,9 @@ def test_the_flat_side_does_not_cut() -> None:
 
 
 def test_only_edges_that_cut_are_drawn() -> None:
-    assert cuts("kitchen knife", "edge")
-    assert not cuts("spatula", "front edge")
-    assert not cuts("putty knife", "edge")
-    assert not cuts("ruler", "edge")
+    assert is_cutting_edge("kitchen knife", "edge")
+    assert not is_cutting_edge("spatula", "front edge")
+    assert not is_cutting_edge("putty knife", "edge")
+    assert not is_cutting_edge("ruler", "edge")
     assert not SKILLS["cut_motion"].suits(SPOT.pool, SPOT.twin(0), None)  # a thing
     assert SKILLS["cut_motion"].suits(SPOT.pool, replace(SPOT.twin(0), category="knife"), None)

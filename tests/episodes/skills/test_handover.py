@@ -20,11 +20,11 @@ from manitwin.episodes.execution import Execution
 from manitwin.episodes.hdf5_file import EpisodeFile, write_episodes
 from manitwin.episodes.lerobot.frame_features import features_of, frames_of
 from manitwin.episodes.planning.problem import Grasp, Phase, PickPlaceProblem
-from manitwin.episodes.planning.two_arms import Take, TwoArmPlanner
+from manitwin.episodes.planning.two_arms import TakePlan, TwoArmPlanner
 from manitwin.episodes.recording import Recording, tip_delta
 from manitwin.episodes.settings import EpisodeSettings, TrajectoriesConfig
-from manitwin.episodes.skills.hands import check_hand, check_jaws
 from manitwin.episodes.skills.registry import load_skill
+from manitwin.episodes.skills.robot_compatibility import check_hand, check_jaws
 from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode, recorded_robot
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.geometry.poses import transform
@@ -178,8 +178,8 @@ def test_what_cannot_be_taken_anywhere_is_not_handed_over() -> None:
 
 
 def test_a_second_arm_that_does_not_close_takes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    close = Execution.close
-    monkeypatch.setattr(Execution, "close", lambda self: close(self) if self.used == GIVER else None)
+    close = Execution.close_hand
+    monkeypatch.setattr(Execution, "close_hand", lambda self: close(self) if self.selected_arm == GIVER else None)
     facts, recording = attempt()
     assert facts.outcome == "dropped"
     assert facts.events == ()
@@ -188,10 +188,10 @@ def test_a_second_arm_that_does_not_close_takes_nothing(monkeypatch: pytest.Monk
 
 
 def test_a_first_arm_that_does_not_let_go_has_not_handed_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    def stay(course: HandoverCourse, _: Take, execution: Execution) -> None:
+    def stay(course: HandoverCourse, _: TakePlan, execution: Execution) -> None:
         course._giver_rad = execution.commanded_rad
 
-    monkeypatch.setattr(HandoverCourse, "_let_go", stay)
+    monkeypatch.setattr(HandoverCourse, "_release_and_withdraw", stay)
     monkeypatch.setattr(HandoverCourse, "_set_down", lambda *_: None)
     facts, _ = attempt()
     assert facts.outcome == "goal_missed"
@@ -208,7 +208,7 @@ def test_a_second_arm_that_keeps_the_bar_has_not_handed_it_over(monkeypatch: pyt
 
 
 def test_a_second_arm_that_lets_the_bar_fall_has_not_put_it_down(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(HandoverCourse, "_set_down", lambda _, __, execution: execution.open())
+    monkeypatch.setattr(HandoverCourse, "_set_down", lambda _, __, execution: execution.open_hand())
     facts, _ = attempt()
     assert facts.outcome == "goal_missed"
     assert facts.evaluation is not None

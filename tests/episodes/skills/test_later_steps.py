@@ -10,7 +10,7 @@ from placing_skills import GRASPS, around, placed
 from manitwin.episodes.goals.evaluation import evaluate
 from manitwin.episodes.goals.goal import Goal
 from manitwin.episodes.goals.world_state import WorldState
-from manitwin.episodes.sequence import Step, goal_of_later_step
+from manitwin.episodes.sequence import GoalStep, goal_of_later_step
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import SkillGoal, Surroundings, state_at_rest
 
@@ -21,11 +21,11 @@ def room(*moved: tuple[float, float]) -> Surroundings:
     return around(placed(0, "dice", x_m, y_m), placed(1, "box", 0.5, -0.1), placed(2, "can", 0.5, 0.2))
 
 
-def step(skill: str, target: str, partner: str) -> Step:
+def step(skill: str, target: str, partner: str) -> GoalStep:
     """A step with its goal as set beforehand, without poses."""
     objects = {each.name: each for each in room().objects}
     goal = SKILLS[skill].goal(objects[target], objects[partner])
-    return Step(SKILLS[skill], target, partner, (GRASPS["dice"],), SkillGoal(goal, (), partner, {}))
+    return GoalStep(SKILLS[skill], target, partner, (GRASPS["dice"],), SkillGoal(goal, (), partner, {}))
 
 
 def test_a_second_place_keeps_the_first_literal_true() -> None:
@@ -33,7 +33,7 @@ def test_a_second_place_keeps_the_first_literal_true() -> None:
     first, second = step("left_of", "object_00", "object_01"), step("near", "object_00", "object_02")
     both = Goal(tuple(each.goal.goal.literals[0] for each in (first, second)))
 
-    def kept(steps: list[Step], seed: int) -> list[bool]:
+    def kept(steps: list[GoalStep], seed: int) -> list[bool]:
         found = goal_of_later_step(steps, 1, here, seed)
         return [] if found is None else [evaluate(_moved(here, pose), both).reached for pose in found.poses]
 

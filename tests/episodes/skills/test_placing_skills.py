@@ -11,7 +11,7 @@ from placing_skills import AREA, GRASPS, LYING, POOL, around, attempt, goal_of, 
 
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.registry import PICK_PLACE, SKILLS, load_skill, skill_names
-from manitwin.episodes.skills.skill import FoundPoses
+from manitwin.episodes.skills.skill import LazyPoses
 from manitwin.episodes.skills.within_rim import LET_GO_M
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform, transform_points
@@ -100,7 +100,7 @@ def test_sides_are_free_and_in_reach(seed: int) -> None:
             for other in surroundings.objects[1:]:
                 there = transform_points(other.object_to_world, np.concatenate(other.body.hulls))
                 assert np.linalg.norm(corners[:, None, :2] - there[None, :, :2], axis=2).min() > 0.02
-            assert AREA.reaches(pose[:2, 3], corners[:, :2])
+            assert AREA.is_reachable(pose[:2, 3], corners[:, :2])
 
 
 def test_only_what_fits_goes_into_a_vessel() -> None:
@@ -198,7 +198,7 @@ def test_poses_are_looked_for_as_they_are_asked_for_and_each_once() -> None:
         looked_for.append(number)
         return np.full((4, 4), number)
 
-    poses = FoundPoses(find(number) for number in range(4))
+    poses = LazyPoses(find(number) for number in range(4))
     assert poses[0][0, 0] == 0 and looked_for == [0]
     assert [pose[0, 0] for _, pose in zip("ab", poses, strict=False)] == [0, 1]
     assert looked_for == [0, 1]

@@ -24,7 +24,7 @@ SPOT = two_things((BODY, FRAMES), mixing_bowl(), ((0.5, -0.2), (0.5, 0.12)))
 
 
 def poured_goal() -> SkillGoal:
-    goal = SKILLS["pour"].set_goal(SPOT, 0, 1, np.random.default_rng(1))
+    goal = SKILLS["pour"].sample_goal(SPOT, 0, 1, np.random.default_rng(1))
     assert goal is not None
     return with_fewer(goal)
 
@@ -42,14 +42,14 @@ def test_a_cup_is_emptied_into_a_bowl_and_put_back() -> None:
 
 
 def test_where_no_way_back_is_found_the_arm_goes_back_as_it_came(monkeypatch: pytest.MonkeyPatch) -> None:
-    go_back = HeldCourse._go_back
+    go_back = HeldCourse._return_along_path
 
     def without_a_plan(course: HeldCourse, execution: Execution, been: list[np.ndarray]) -> None:
         with monkeypatch.context() as patch:
-            patch.setattr(HeldPathPlanner, "onward", lambda *_, **__: None)
+            patch.setattr(HeldPathPlanner, "plan_spline", lambda *_, **__: None)
             go_back(course, execution, been)
 
-    monkeypatch.setattr(HeldCourse, "_go_back", without_a_plan)
+    monkeypatch.setattr(HeldCourse, "_return_along_path", without_a_plan)
     facts, recording = attempt(SPOT, poured_goal(), GRASPS)
     assert facts.replans["back_as_it_came"] == 1
     assert facts.outcome == "kept", (facts.evaluation, facts.unplanned)

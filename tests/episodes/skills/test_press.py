@@ -66,7 +66,7 @@ def test_a_button_that_lies_on_the_table_has_no_way_to_be_pressed() -> None:
 
 
 def test_the_first_corner_of_a_tilted_hand_leads() -> None:
-    corners = fingertip_corners(panda()[1].closed)
+    corners = fingertip_corners(panda()[1].closed_hand)
     assert np.ptp(corners, axis=0)[:2] == pytest.approx(
         [0.0304, 0.0175], abs=2e-4
     )  # of the Panda: measured on its meshes

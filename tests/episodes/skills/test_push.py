@@ -12,15 +12,15 @@ from granular_things import two_things
 from held_skills import around
 
 from manitwin.episodes.courses import push as push_course
-from manitwin.episodes.courses.course import Start
-from manitwin.episodes.episode import run_episode, world_of
+from manitwin.episodes.courses.course import EpisodeStart
+from manitwin.episodes.episode import create_world, run_episode
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.push import MARK
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import SkillGoal, Surroundings
-from manitwin.episodes.skills.strokes import is_met, strokes
+from manitwin.episodes.skills.strokes import strokes, touches_near_edge
 from manitwin.episodes.tool_watches import PushWatch
 from manitwin.geometry.poses import transform, transform_points
 from rigid_boxes import above, block, box
@@ -32,7 +32,7 @@ SPOT = around(replace(BOX, center_of_mass_m=np.array([0.0, 0.01, 0.02])), (), 0.
 
 
 def goal_of(surroundings: Surroundings, seed: int) -> SkillGoal:
-    goal = SKILLS["push"].set_goal(surroundings, 0, None, np.random.default_rng(seed))
+    goal = SKILLS["push"].sample_goal(surroundings, 0, None, np.random.default_rng(seed))
     assert goal is not None
     return goal
 
@@ -56,8 +56,8 @@ def test_what_the_fingertips_would_pass_over_is_not_pushed_that_way() -> None:
     )
     spot = around(spoon, (), 0.5, 0.05)
     for way, meets in (([1.0, 0], True), ([-1.0, 0], False), ([0, 1.0], False)):
-        assert is_met(spot.objects[0], np.array(way)) == meets  # from behind the bowl alone
-    assert is_met(SPOT.objects[0], np.array([0.6, 0.8]))
+        assert touches_near_edge(spot.objects[0], np.array(way)) == meets  # from behind the bowl alone
+    assert touches_near_edge(SPOT.objects[0], np.array([0.6, 0.8]))
     for seed in range(4):
         goal = goal_of(spot, seed)
         assert goal.places_m[MARK][0] > 0.5, "away from the bowl"
@@ -72,8 +72,8 @@ def test_what_lies_so_that_it_would_roll_is_not_pushed_though_it_could_be_as_it_
     on_its_side = transform(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([0.5, 0.05, 0.025]))
     lying = replace(standing, objects=(replace(placed, object_to_world=on_its_side),))
     assert SKILLS["push"].suits(standing.pool, standing.twin(0), None)
-    assert SKILLS["push"].set_goal(standing, 0, None, np.random.default_rng(1)) is not None
-    assert SKILLS["push"].set_goal(lying, 0, None, np.random.default_rng(1)) is None
+    assert SKILLS["push"].sample_goal(standing, 0, None, np.random.default_rng(1)) is not None
+    assert SKILLS["push"].sample_goal(lying, 0, None, np.random.default_rng(1)) is None
 
 
 def attempt(goal: SkillGoal, grasps: tuple[Grasp, ...] = ()) -> EpisodeFacts:
@@ -115,11 +115,11 @@ def test_a_push_is_watched_at_what_is_pushed_while_another_object_is_taken() -> 
         pair.objects[0], pair.objects[0].object_to_world, (), pair.objects[1:], pair.boxes, seed=3
     )
     robot, planner = panda()
-    start = Start(problem, pair.objects, planner, EpisodeSettings(), goal_of(pair, 0))
-    with world_of(problem, robot, EpisodeSettings(), 50.0) as world:
+    start = EpisodeStart(problem, pair.objects, planner, EpisodeSettings(), goal_of(pair, 0))
+    with create_world(problem, robot, EpisodeSettings(), 50.0) as world:
         (watch,) = push_course.PushCourse(start, EpisodeFacts()).watches(world)
         assert isinstance(watch, PushWatch)
-        world.take(1)
+        world.set_target(1)
         assert np.allclose(watch.center()[:2], [0.5, 0.01], atol=0.011)
         world.bodies[1].set_linear_velocity(np.array([0, 0, 1.0], np.float32))
         world.step(12)

@@ -33,7 +33,7 @@ SPOT = two_things((STICK, (HANDLE,)), mixing_bowl(), ((0.45, -0.2), (0.5, 0.12))
 
 
 def stirred_goal() -> SkillGoal:
-    goal = SKILLS["stir"].set_goal(SPOT, 0, 1, np.random.default_rng(1))
+    goal = SKILLS["stir"].sample_goal(SPOT, 0, 1, np.random.default_rng(1))
     assert goal is not None
     return with_fewer(goal, 30)
 

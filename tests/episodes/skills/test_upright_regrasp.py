@@ -11,7 +11,7 @@ from manitwin.episodes.episode import run_episode
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.episodes_run import twins_for
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
-from manitwin.episodes.room_for_hand import begins_with_room
+from manitwin.episodes.room_for_hand import start_placements_with_room
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import Skill, Surroundings
@@ -50,7 +50,7 @@ def stood_up(*placements: StandingPose) -> EpisodeFacts:
         "object_00", twin.twin_id, BODY, transform(translation=np.array([0.45, 0.1, 0])) @ PLACEMENTS[1].object_to_plane
     )
     around = Surroundings((lying,), Pool([twin], lambda _: BODY), AREA, (TABLE,))
-    goal = SKILLS["upright"].set_goal(around, 0, None, np.random.default_rng(2))
+    goal = SKILLS["upright"].sample_goal(around, 0, None, np.random.default_rng(2))
     assert goal is not None
     robot, planner = panda()
     asked = PickPlaceProblem(lying, goal.poses[0], (FROM_Y, FROM_Z), (), around.boxes, seed=3)
@@ -73,7 +73,7 @@ def test_the_ways_are_placements_in_which_it_does_not_stand() -> None:
     twin = PoolTwin(twin_id(0), "0", "bar", PLACEMENTS, False, ())
     lying = PlacedObject("object_00", twin.twin_id, BODY, PLACEMENTS[1].object_to_plane)
     around = Surroundings((lying,), Pool([twin], lambda _: BODY), AREA, (TABLE,))
-    goals = [SKILLS["upright"].set_goal(around, 0, None, np.random.default_rng(5)) for _ in range(2)]
+    goals = [SKILLS["upright"].sample_goal(around, 0, None, np.random.default_rng(5)) for _ in range(2)]
     first, second = (list(goal.ways) for goal in goals if goal is not None and goal.ways is not None)
     assert len(first) == len(second) > 4
     assert all(np.array_equal(one, other) for one, other in zip(first, second, strict=True))
@@ -87,7 +87,7 @@ def test_episodes_are_only_of_twins_that_a_grasp_brings_there() -> None:
     def begins(skill: Skill, twin: PoolTwin) -> list[StandingPose]:
         grasps = (FROM_Y, FROM_Z) if twin is twins[1] else (FROM_Y,)
         ends, gripper = skill.ends_in(twin), panda()[0].gripper
-        return begins_with_room(skill.begins_in(twin), ends, twin.poses, grasps, gripper, BODY)
+        return start_placements_with_room(skill.begins_in(twin), ends, twin.poses, grasps, gripper, BODY)
 
     assert twins_for(upright, pool, begins) == [twins[1].twin_id]
     with pytest.raises(UsageError, match="can be used to upright"):

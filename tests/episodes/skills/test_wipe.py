@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from held_skills import around, attempt, beside, goal_of
 
-from manitwin.episodes.courses.regulated import Admittance, with_heights
+from manitwin.episodes.courses.force_control import Admittance, with_heights
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
 from manitwin.episodes.planning.path_timing import joint_spline
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.recording import RATE_HZ, Recording
 from manitwin.episodes.skills.registry import SKILLS
-from manitwin.geometry.frames.words import wipes
+from manitwin.geometry.frames.label_keywords import is_wiping_face
 from manitwin.geometry.poses import rotation_angle_rad, rotation_from_quaternion_wxyz, transform, transform_points
 from manitwin.robots.load import load_robot
 from manitwin.scenes.layouts.twin_frames import TwinFrame
@@ -87,10 +87,10 @@ def test_only_what_wipes_and_is_thick_enough_for_fingers_is_taken() -> None:
     assert not SKILLS["wipe"].suits(SPOT.pool, around(BODY, (replace(FACE, label="base"),), 0.5, 0.05).twin(0), None)
     thin = around(replace(BODY, hulls=tuple(hull * [1, 1, 0.3] for hull in BODY.hulls)), (FACE,), 0.5, 0.05)
     assert not SKILLS["wipe"].suits(thin.pool, thin.twin(0), None)
-    assert wipes("sponge", "back face")
-    assert wipes("cleaning brush", "bristles")
-    assert not wipes("mug", "base")
-    assert not wipes("soap dispenser", "base")
+    assert is_wiping_face("sponge", "back face")
+    assert is_wiping_face("cleaning brush", "bristles")
+    assert not is_wiping_face("mug", "base")
+    assert not is_wiping_face("soap dispenser", "base")
 
 
 def test_the_height_settles_where_a_spring_presses_as_asked() -> None:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from placing_skills import POOL, around, placed
 
-from manitwin.episodes.skills.within_rim import LET_GO_M, as_it_is, leaning, on_end
+from manitwin.episodes.skills.within_rim import LET_GO_M, leaning_pose, pose_in_orientation, pose_on_end
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.scenes.layouts.pool import Pool, PoolBody, PoolTwin, StandingPose
-from manitwin.scenes.layouts.stacking import Mouth, mouth_of
+from manitwin.scenes.layouts.stacking import ContainerOpening, container_opening
 from rigid_boxes import box
 from twin_folders import twin_id
 
@@ -18,8 +18,8 @@ DICE, VESSEL = POOL.body(SPOT.objects[0].twin_id), SPOT.parts(1)
 BAR = box([0.03, 0.24, 0.03], 0.2)
 
 
-def mouth() -> Mouth:
-    found = mouth_of(SPOT.body(1), SPOT.objects[1].object_to_world)
+def mouth() -> ContainerOpening:
+    found = container_opening(SPOT.body(1), SPOT.objects[1].object_to_world)
     assert found is not None
     return found
 
@@ -31,7 +31,9 @@ def below_rim_m(pose: np.ndarray | None) -> float:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_on_end_it_is_deep_where_asked_for_and_else_below_the_rim(seed: int) -> None:
-    shallow, deep = (on_end(DICE, VESSEL, mouth(), np.random.default_rng(seed), deep=deep) for deep in (False, True))
+    shallow, deep = (
+        pose_on_end(DICE, VESSEL, mouth(), np.random.default_rng(seed), deep=deep) for deep in (False, True)
+    )
     assert below_rim_m(shallow) == pytest.approx(min(LET_GO_M, 0.8 * mouth().depth_m), abs=1e-6)
     assert below_rim_m(shallow) < below_rim_m(deep) < mouth().depth_m
 
@@ -39,7 +41,7 @@ def test_on_end_it_is_deep_where_asked_for_and_else_below_the_rim(seed: int) -> 
 @pytest.mark.parametrize("seed", range(4))
 def test_as_it_stands_it_is_turned_about_the_vertical_alone(seed: int) -> None:
     tilted = np.array([[1.0, 0, 0], [0, 0.8, -0.6], [0, 0.6, 0.8]])
-    pose = as_it_is(DICE, tilted, VESSEL, mouth(), np.random.default_rng(seed))
+    pose = pose_in_orientation(DICE, tilted, VESSEL, mouth(), np.random.default_rng(seed))
     assert 0 < below_rim_m(pose) < mouth().depth_m
     assert pose is not None
     assert (pose[:3, :3] @ tilted.T)[2] == pytest.approx([0, 0, 1], abs=1e-9)
@@ -55,7 +57,7 @@ def bar() -> PoolBody:
 def test_what_leans_has_an_end_below_the_rim_and_its_upper_side_up() -> None:
     rng, found = np.random.default_rng(0), list[np.ndarray]()
     for _ in range(60):
-        pose = leaning(bar(), np.eye(3), VESSEL, mouth(), rng)
+        pose = leaning_pose(bar(), np.eye(3), VESSEL, mouth(), rng)
         if pose is not None:
             found.append(pose)
     assert len(found) > 10
@@ -71,6 +73,6 @@ def test_what_leans_has_an_end_below_the_rim_and_its_upper_side_up() -> None:
 
 
 def test_nothing_is_within_too_narrow_a_rim() -> None:
-    narrow = Mouth(mouth().center_m, 0.01, mouth().depth_m)
-    assert on_end(DICE, VESSEL, narrow, np.random.default_rng(0), deep=True) is None
-    assert as_it_is(DICE, np.eye(3), VESSEL, narrow, np.random.default_rng(0)) is None
+    narrow = ContainerOpening(mouth().center_m, 0.01, mouth().depth_m)
+    assert pose_on_end(DICE, VESSEL, narrow, np.random.default_rng(0), deep=True) is None
+    assert pose_in_orientation(DICE, np.eye(3), VESSEL, narrow, np.random.default_rng(0)) is None

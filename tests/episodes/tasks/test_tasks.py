@@ -14,15 +14,15 @@ import manitwin
 from grasped_twins import write_brick
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.episodes.collect import batch_folders, collect, stored_episodes
+from manitwin.episodes.downsampling import downsample
 from manitwin.episodes.episodes_run import make_episodes
-from manitwin.episodes.lower_rates import at_rate
 from manitwin.episodes.recording import Recording
 from manitwin.episodes.settings import TasksConfig, TrajectoriesConfig
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.tasks.bddl import bddl_of
 from manitwin.episodes.tasks.task_files import TASKS, one_task, read_tasks, tasks_bytes
 from manitwin.episodes.tasks.task_record import TaskRecord
-from manitwin.episodes.tasks.tasks_run import REPORT, evened, make_tasks
+from manitwin.episodes.tasks.tasks_run import REPORT, balanced_tasks, make_tasks
 from manitwin.errors import UsageError
 from manitwin.models.fakes.openai_chat import FakeOpenAi
 from manitwin.models.fakes.server import FakeServer
@@ -143,7 +143,7 @@ def test_no_kind_is_too_frequent_and_two_literals_are_not_too_rare(tasks: list[T
     single = [task for task in tasks if len(task.steps) == 1]
     double = next(task for task in tasks if len(task.steps) == 2)
     many = [task.model_copy(update={"task_id": str(n), "kind": "left_of"}) for n, task in enumerate(single[:1] * 20)]
-    kept, dropped = evened([*many, *single, double], 0.3, 0.2)
+    kept, dropped = balanced_tasks([*many, *single, double], 0.3, 0.2)
     assert sum(task.kind == "left_of" for task in kept) <= 0.3 * len(kept) + 1
     assert sum(len(task.steps) == 2 for task in kept) >= 0.2 * len(kept)
     assert dropped.total() == 21 + len(single) - len(kept)
@@ -226,7 +226,7 @@ def test_recorded_commands_reach_success_in_the_environment_and_wrong_ones_do_no
 def test_commands_of_a_lower_rate_reach_success_in_an_environment_of_that_rate(
     folder: Path, kept: list[StoredEpisode], rate_hz: int
 ) -> None:
-    recording = at_rate(kept[0].recording, rate_hz)
+    recording = downsample(kept[0].recording, rate_hz)
     env = manitwin.make_env(folder, kept[0].attempt.task_id, rate_hz=rate_hz)
     assert env.metadata["render_fps"] == rate_hz
     env.reset(seed=0)

@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from manitwin.errors import InputError
-from manitwin.formats.meshes.gltf_meshopt import decode_indices, decode_triangles, decompressed
+from manitwin.formats.meshes.gltf_meshopt import decode_indices, decode_triangles, decompress_view
 from manitwin.formats.meshes.read import read_mesh
 from manitwin.formats.meshes.textures import normals_of
 from meshopt_document import compressed_document, stream
@@ -43,7 +43,7 @@ def test_triangles_keep_their_order_and_sides() -> None:
 
 
 def test_quaternions_are_unit_ones_with_their_signs() -> None:
-    made = decompressed(stream("quaternions"), mode="ATTRIBUTES", filter="QUATERNION", count=6, stride=8)
+    made = decompress_view(stream("quaternions"), mode="ATTRIBUTES", filter="QUATERNION", count=6, stride=8)
     quaternions = np.frombuffer(made, "<i2").reshape(6, 4) / 32767
     given = np.random.default_rng(0).normal(size=(6, 4))
     given /= np.linalg.norm(given, axis=1, keepdims=True)
@@ -54,7 +54,7 @@ def test_deltas_of_four_bits_are_the_specifications_example() -> None:
     """Appendix A, mode 0: sixteen deltas, of which two follow as whole bytes."""
     group = bytes.fromhex("175ff0bc77a9210034b5")
     data = b"\xa0" + b"\x02" + group + b"\x00" * 3 + bytes(32)
-    made = np.frombuffer(decompressed(data, mode="ATTRIBUTES", filter="NONE", count=16, stride=4), np.uint8)
+    made = np.frombuffer(decompress_view(data, mode="ATTRIBUTES", filter="NONE", count=16, stride=4), np.uint8)
     deltas = [-1, -4, -3, 26, -91, 0, -6, 6, -4, -4, 5, -5, 1, -1, 0, 0]
     assert made.reshape(16, 4)[:, 0].tolist() == (np.cumsum(deltas) % 256).tolist()
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.formats.meshes.repaired import repaired_parts
+from manitwin.formats.meshes.repaired_parts import repaired_parts
 from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.geometry.repair.cascade import repair
 

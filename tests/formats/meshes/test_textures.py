@@ -7,9 +7,9 @@ import pytest
 import trimesh
 from PIL import Image
 
+from manitwin.formats.meshes.shading_normals import with_creased_normals
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
 from manitwin.formats.meshes.textures import bake_transform, color_by_corner, decode_texture, make_part, pbr_material
-from manitwin.formats.meshes.triangles import with_creased_normals
 
 
 def _part(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.geometry.frames.feature import FeatureFrame, FramedMesh, Unclear
+from manitwin.geometry.frames.feature import FeatureFrame, FramedMesh, NoFrame
+from manitwin.geometry.frames.feature_deviation import ON_FEATURE_M, feature_deviation_m
 from manitwin.geometry.frames.find import find_frame
-from manitwin.geometry.frames.on_feature import ON_FEATURE_M, off_feature_m
-from manitwin.geometry.frames.words import fits, kinds_for
+from manitwin.geometry.frames.label_keywords import frame_kinds_for_label, is_compatible_kind
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.object_sampling import make_object
 
 TURN = rotation_from_quaternion_wxyz(np.array([0.9, 0.1, -0.3, 0.3]) / np.linalg.norm([0.9, 0.1, -0.3, 0.3]))
 
@@ -33,7 +33,7 @@ def found(mesh: trimesh.Trimesh, point: object, normal: object, label: str) -> F
     assert isinstance(frame, FeatureFrame), frame
     assert np.allclose(frame.rotation.T @ frame.rotation, np.eye(3), atol=1e-9)
     assert np.linalg.det(frame.rotation) == pytest.approx(1)
-    off = off_feature_m(frame.kind, frame.position_m, frame.rotation, frame.size_m, surface.samples[0])
+    off = feature_deviation_m(frame.kind, frame.position_m, frame.rotation, frame.size_m, surface.samples[0])
     assert off < ON_FEATURE_M
     return frame
 
@@ -122,23 +122,30 @@ def test_ball_has_no_frame_but_a_reason(label: str) -> None:
     ball = trimesh.creation.icosphere(4, 0.04)
     for point in ([0, 0, 0.04], [0.04, 0, 0]):
         frame = find_frame(framed(ball), np.array(point), np.array(point) / 0.04, label)
-        assert isinstance(frame, Unclear) and frame.reason if label != "button" else frame.kind == "surface"
+        assert isinstance(frame, NoFrame) and frame.reason if label != "button" else frame.kind == "surface"
 
 
 def test_frame_beside_its_feature_is_told() -> None:
     surface = framed(cup())
     points, turn = surface.samples[0], np.eye(3)
-    assert off_feature_m("opening", np.array([0, 0, 0.09]), turn, 0.037, points) < ON_FEATURE_M
-    assert off_feature_m("opening", np.array([0, 0, 0.1]), turn, 0.037, points) > ON_FEATURE_M
-    assert off_feature_m("opening", np.array([0.1, 0, 0.09]), turn, 0.037, points) == np.inf
-    assert off_feature_m("tip", np.array([0, 0, 0.05]), turn, 0.01, points) > 0.03
+    assert feature_deviation_m("opening", np.array([0, 0, 0.09]), turn, 0.037, points) < ON_FEATURE_M
+    assert feature_deviation_m("opening", np.array([0, 0, 0.1]), turn, 0.037, points) > ON_FEATURE_M
+    assert feature_deviation_m("opening", np.array([0.1, 0, 0.09]), turn, 0.037, points) == np.inf
+    assert feature_deviation_m("tip", np.array([0, 0, 0.05]), turn, 0.01, points) > 0.03
 
 
 def test_words_choose_the_kind() -> None:
-    assert kinds_for("Mouth")[0] == "opening" and kinds_for("cutting edge") == ("edge",)
-    assert kinds_for("pouring spout") == ("tip",) and kinds_for("base")[0] == "face"
-    assert kinds_for("front feet")[0] == kinds_for("toe")[0] == "tip" and kinds_for("foot")[0] == "face"
-    assert fits("handle", "hole") and fits("thing", "edge") and not fits("blade", "opening")
+    assert frame_kinds_for_label("Mouth")[0] == "opening" and frame_kinds_for_label("cutting edge") == ("edge",)
+    assert frame_kinds_for_label("pouring spout") == ("tip",) and frame_kinds_for_label("base")[0] == "face"
+    assert (
+        frame_kinds_for_label("front feet")[0] == frame_kinds_for_label("toe")[0] == "tip"
+        and frame_kinds_for_label("foot")[0] == "face"
+    )
+    assert (
+        is_compatible_kind("handle", "hole")
+        and is_compatible_kind("thing", "edge")
+        and not is_compatible_kind("blade", "opening")
+    )
 
 
 def test_bristles_that_stand_out_of_the_side_near_an_end_have_no_frame() -> None:
@@ -146,13 +153,13 @@ def test_bristles_that_stand_out_of_the_side_near_an_end_have_no_frame() -> None
     tuft = trimesh.creation.box((0.02, 0.012, 0.018)).apply_translation([-0.012, 0, 0.011])
     brush = framed(handle.union(tuft))
     nothing = find_frame(brush, np.array([-0.004, 0, 0.02]), np.array([0, 0, 1.0]), "bristles")
-    assert isinstance(nothing, Unclear) and "different ways" in nothing.reason
+    assert isinstance(nothing, NoFrame) and "different ways" in nothing.reason
 
 
 def test_tip_of_what_ends_in_two_directions_is_not_clear() -> None:
     """A hammer's claw bends away from the handle: beside its root the tool's own end is as near as the claw's."""
     templates = load_templates()
-    made = make(templates["hammer"], read_text("hammer", templates), np.random.default_rng(0))
+    made = make_object(templates["hammer"], read_text("hammer", templates), np.random.default_rng(0))
     hammer = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
     points, normals, faces = sample_surface(hammer, 8000, np.random.default_rng(0))
     claw = next(known for known in made.points if known.label == "claw")
@@ -160,7 +167,7 @@ def test_tip_of_what_ends_in_two_directions_is_not_clear() -> None:
     on_claw = chosen[made.mesh.part[faces[chosen]] == made.mesh.names.index(claw.part)]
     nearest = on_claw[np.linalg.norm(points[on_claw] - claw.position_m, axis=1).argmin()]
     nothing = find_frame(framed(hammer), points[nearest], normals[nearest], "claw")
-    assert isinstance(nothing, Unclear) and "several directions" in nothing.reason
+    assert isinstance(nothing, NoFrame) and "several directions" in nothing.reason
 
 
 def test_place_on_a_thin_rod_has_a_frame_as_small_as_what_is_flat_there() -> None:
@@ -176,15 +183,15 @@ def test_place_on_a_thorn_has_no_frame() -> None:
     thing = trimesh.creation.box((0.12, 0.12, 0.02)).apply_translation([0, 0, -0.009]).union(thorn)
     surface = framed(thing)
     tip = find_frame(surface, np.array([0.0, 0.0, 0.0099]), np.array([0.8, 0.0, 0.6]), "joint")
-    assert isinstance(tip, Unclear)
+    assert isinstance(tip, NoFrame)
 
 
 def test_distance_of_a_frame_is_exact_where_samples_are_far_apart() -> None:
     cube = trimesh.creation.box((0.4, 0.4, 0.4))
     center, corners = np.array([0, 0, 0.2]), np.asarray(cube.vertices)
-    assert off_feature_m("face", center, np.eye(3), 0.2, corners) > 0.2
-    assert off_feature_m("face", center, np.eye(3), 0.2, corners, cube) == pytest.approx(0, abs=1e-9)
-    assert off_feature_m("face", np.array([0, 0, 0.23]), np.eye(3), 0.2, corners, cube) == pytest.approx(0.03)
+    assert feature_deviation_m("face", center, np.eye(3), 0.2, corners) > 0.2
+    assert feature_deviation_m("face", center, np.eye(3), 0.2, corners, cube) == pytest.approx(0, abs=1e-9)
+    assert feature_deviation_m("face", np.array([0, 0, 0.23]), np.eye(3), 0.2, corners, cube) == pytest.approx(0.03)
 
 
 def test_place_on_an_edge_has_the_frame_of_the_side_that_it_looks_to() -> None:
@@ -193,4 +200,4 @@ def test_place_on_an_edge_has_the_frame_of_the_side_that_it_looks_to() -> None:
     assert edge.kind == "surface" and edge.z @ [0, 0, 1] > 0.99
     assert abs(edge.position_m[2] - 0.002) < 1e-4 and np.linalg.norm(edge.position_m - [0.03, 0.015, 0.002]) < 0.005
     corner = find_frame(framed(plate), np.array([0.1, 0.015, 0.002]), np.full(3, 3**-0.5), "head")
-    assert isinstance(corner, Unclear)  # three sides, and it looks to none of them
+    assert isinstance(corner, NoFrame)  # three sides, and it looks to none of them

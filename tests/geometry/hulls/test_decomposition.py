@@ -13,8 +13,8 @@ from manitwin.geometry.hulls.error import hull_error
 from manitwin.geometry.hulls.reduction import convex_corners, hull_to_obj, hull_volume
 from manitwin.geometry.repair.cascade import repair
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.object_sampling import make_object
 from real_meshes import VESSELS, cup, load_real_mesh, mesh_rows
 
 
@@ -101,7 +101,7 @@ def test_a_hole_through_a_thing_stays_open(
 @pytest.mark.parametrize("category", ["roll of tape", "curtain ring", "toilet paper"])
 def test_a_hole_through_a_thing_of_a_template_stays_open(category: str) -> None:
     templates = load_templates()
-    parted = make(templates[category], read_text(category, templates), np.random.default_rng(0)).mesh
+    parted = make_object(templates[category], read_text(category, templates), np.random.default_rng(0)).mesh
     mesh = repair(trimesh.Trimesh(parted.vertices, parted.faces, process=False)).mesh
     found = _decompose(mesh)
     assert rod_passes(found.hulls, mesh.bounds.mean(axis=0), np.array([0.0, 0, 1]), 0.01, 1.0)

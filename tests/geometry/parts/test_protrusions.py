@@ -32,7 +32,7 @@ def test_a_mugs_handle_is_found_where_it_is(turn_deg: float) -> None:
 def test_the_handles_points_belong_to_it_and_the_bodys_do_not() -> None:
     body = round_body(samples(mug()))
     points = np.array([[0.072, 0, 0.05], [-0.04, 0, 0.05], [0.028, 0.028, 0.05], [0.0, 0.0, 0.0]])
-    assert body.belongs(points, body.protrusions[0]).tolist() == [True, False, False, False]
+    assert body.protrusion_mask(points, body.protrusions[0]).tolist() == [True, False, False, False]
 
 
 @pytest.mark.parametrize("mesh", [cup(), cylinder(0.03, 0.2), trimesh.creation.icosphere(radius=0.05)])

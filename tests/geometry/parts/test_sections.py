@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from trimesh.creation import box, revolve
 
-from manitwin.geometry.parts.segmentation import Segmentation, segmented
+from manitwin.geometry.parts.segmentation import Segmentation, segment_by_rule
 from manitwin.geometry.parts.shape import HeadEnd, measure_shape
 
 
@@ -32,7 +32,7 @@ def mirrored(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 def told(mesh: trimesh.Trimesh, head_end: HeadEnd = "narrow", noise_m: float = 0.0) -> Segmentation | None:
     mesh.vertices += np.random.default_rng(0).normal(0, noise_m, mesh.vertices.shape) if noise_m else 0.0
     shape = measure_shape(mesh, mesh.center_mass, head_end, False, np.random.default_rng(0))
-    return segmented(mesh, shape, "sectioned")
+    return segment_by_rule(mesh, shape, "sectioned")
 
 
 def role_at(mesh: trimesh.Trimesh, found: Segmentation, least_m: float, most_m: float) -> dict[str, float]:

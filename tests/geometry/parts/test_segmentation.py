@@ -8,7 +8,7 @@ import trimesh
 from trimesh.creation import annulus, box, cylinder, icosphere, revolve
 
 from manitwin.geometry.parts.membership import PartRule
-from manitwin.geometry.parts.segmentation import Segmentation, carried_over, segmented
+from manitwin.geometry.parts.segmentation import Segmentation, segment_by_rule, transfer_face_labels
 from manitwin.geometry.parts.shape import HeadEnd, measure_shape
 
 
@@ -59,7 +59,7 @@ def told(
         mesh = trimesh.Trimesh(mesh.vertices, mesh.faces)
         mesh.vertices += np.random.default_rng(0).normal(0, noise_m, mesh.vertices.shape)
     shape = measure_shape(mesh, mesh.center_mass, head_end, stands, np.random.default_rng(0))
-    found = segmented(mesh, shape, rule)
+    found = segment_by_rule(mesh, shape, rule)
     if found is not None:
         assert found.role.shape == (len(mesh.faces),) and 0.5 <= found.confidence <= 0.9
     return found
@@ -280,6 +280,6 @@ def test_labels_are_carried_to_another_mesh_of_the_surface_and_not_through_a_wal
     plate = box((0.1, 0.1, 0.001))
     labels = (plate.face_normals[:, 2] > 0.5).astype(np.uint8)
     fine = plate.subdivide().subdivide().subdivide()
-    over = carried_over(labels, plate, fine)
+    over = transfer_face_labels(labels, plate, fine)
     flat = np.abs(fine.face_normals[:, 2]) > 0.5
     assert np.array_equal(over[flat], (fine.face_normals[flat, 2] > 0).astype(np.uint8))

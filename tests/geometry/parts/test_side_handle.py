@@ -11,15 +11,15 @@ from manitwin.geometry.parts.features import feature_scores
 from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.parts.shape import SurfacePoints, measure_shape
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.object_sampling import make_object
 
 
 @pytest.mark.parametrize("category", ["teapot", "watering can", "pitcher", "measuring cup", "mug", "frying pan"])
 def test_the_side_handle_is_the_handle(category: str) -> None:
     templates = load_templates()
     for seed in (0, 1):
-        made = make(templates[category], read_text(category, templates), np.random.default_rng(seed))
+        made = make_object(templates[category], read_text(category, templates), np.random.default_rng(seed))
         solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
         shape = measure_shape(solid, solid.center_mass, "wide", True, np.random.default_rng(seed))
         assert shape.side_handle is not None

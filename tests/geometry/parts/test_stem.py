@@ -13,8 +13,8 @@ from manitwin.geometry.parts.shape import measure_shape, surface_points
 from manitwin.geometry.parts.stem import find_stem
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.object_sampling import make_object
 
 
 def _found(mesh: trimesh.Trimesh):  # type: ignore[no-untyped-def]
@@ -60,7 +60,7 @@ def test_what_has_no_one_stem_has_none(mesh: trimesh.Trimesh) -> None:
 @pytest.mark.parametrize("degrees", [0, 100, 180])
 def test_the_stem_end_of_an_onion_that_lies_is_not_its_top(degrees: float) -> None:
     templates = load_templates()
-    made = make(templates["onion"], read_text("onion", templates), np.random.default_rng(3))
+    made = make_object(templates["onion"], read_text("onion", templates), np.random.default_rng(3))
     mesh = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
     turned = Rotation.from_euler("x", degrees, degrees=True).as_matrix()
     mesh.vertices = mesh.vertices @ turned.T

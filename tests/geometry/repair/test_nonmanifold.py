@@ -67,7 +67,7 @@ def test_two_edges_between_the_same_vertices_are_told_apart() -> None:
         one, other = (int(twin[h - h % 3 + (h + k) % 3]) for k in (1, 2))
         twin[one], twin[other] = other, one
     faces[faces == start[halfedge]] = end[halfedge]
-    pinched = replace(surface, faces=faces, twin=twin).only(keep).with_split_vertices()
+    pinched = replace(surface, faces=faces, twin=twin).select_faces(keep).with_split_vertices()
     assert group_edges(pinched.faces, len(pinched.vertices)).counts.max() == 4
     parted, count = separate_coincident_edges(pinched)
     assert count == 1 and len(parted.faces) == len(pinched.faces) + 2

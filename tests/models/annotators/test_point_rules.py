@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from handmade import candidates, cup, hammer, mug, screwdriver, subject
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
 from manitwin.models.annotators.rules import RulesAnnotator
@@ -50,7 +50,9 @@ def test_a_cup_with_a_handle_is_held_by_it_and_one_without_is_not() -> None:
     )
     assert labelled(handled, "handle") == pytest.approx(labelled(select(mug(), "mug"), "handle"))
     assert [point.label for point in plain.functional] == ["opening", "body", "base"]
-    parts = [prior.parts for prior in (lookup("cup"), load_priors()["vase"]) if prior is not None and prior.with_handle]
+    parts = [
+        prior.parts for prior in (find_prior("cup"), load_priors()["vase"]) if prior is not None and prior.with_handle
+    ]
     assert parts == ["open", "open"], "what it is without one is as before"
 
 
@@ -181,7 +183,7 @@ def test_every_form_gets_its_points_on_any_shape(name: str | None) -> None:
 def test_without_a_name_the_rule_is_less_sure() -> None:
     named, unnamed = select(mug(), "mug"), select(mug(), None)
     assert max(p.confidence for p in unnamed.grasp) < min(p.confidence for p in named.functional)
-    assert lookup(None) is None
+    assert find_prior(None) is None
 
 
 def test_the_same_request_gives_the_same_points() -> None:

@@ -11,13 +11,13 @@ from pydantic import ValidationError
 from manitwin.errors import ManiTwinError
 from manitwin.models.annotators import priors
 from manitwin.models.annotators.prior_names import (
-    _found_in_english,
+    _find_english,
+    find_prior,
     found_by,
-    lookup,
     named,
     names_with,
-    normalised,
-    word_for,
+    normalise_name,
+    object_noun,
 )
 from manitwin.models.annotators.prior_records import Interval
 from manitwin.models.annotators.priors import load_materials, load_names_abroad, load_priors
@@ -109,7 +109,7 @@ def test_sliding_friction_is_below_static_friction() -> None:
 
 
 def test_published_masses_are_in_the_intervals() -> None:
-    intervals = {name: lookup(name).mass_kg for name in YCB}
+    intervals = {name: find_prior(name).mass_kg for name in YCB}
     outside = [name for name, mass in YCB.items() if not intervals[name].low <= mass <= intervals[name].high]
     assert len(outside) <= 2, outside
 
@@ -117,7 +117,7 @@ def test_published_masses_are_in_the_intervals() -> None:
 @pytest.mark.parametrize("name", STANDARDS)
 def test_standard_sizes_are_in_the_intervals(name: str) -> None:
     longest, mass = STANDARDS[name]
-    prior = lookup(name)
+    prior = find_prior(name)
     assert prior.longest_axis_m.low <= longest <= prior.longest_axis_m.high
     assert mass is None or prior.mass_kg.low <= mass <= prior.mass_kg.high
 
@@ -144,7 +144,7 @@ def test_standard_sizes_are_in_the_intervals(name: str) -> None:
     ],
 )  # fmt: skip
 def test_lookup_understands_what_people_say(said: str, category: str) -> None:
-    prior = lookup(said)
+    prior = find_prior(said)
     assert prior is not None and prior.category == category
 
 
@@ -159,7 +159,7 @@ def test_lookup_understands_what_people_say(said: str, category: str) -> None:
     ],
 )  # fmt: skip
 def test_what_is_a_part_of_another_thing_is_no_hat_handle_or_container(said: str, category: str | None) -> None:
-    prior = lookup(said)
+    prior = find_prior(said)
     assert (prior and prior.category) == category
 
 
@@ -175,7 +175,7 @@ def test_what_is_a_part_of_another_thing_is_no_hat_handle_or_container(said: str
     ],
 )  # fmt: skip
 def test_lookup_understands_products_of_a_shop(said: str, category: str) -> None:
-    prior = lookup(said)
+    prior = find_prior(said)
     assert prior is not None and prior.category == category
 
 
@@ -186,30 +186,30 @@ def test_lookup_understands_products_of_a_shop(said: str, category: str) -> None
 )  # fmt: skip
 def test_a_kind_and_a_content_are_called_with_what_they_are(said: str, word: str) -> None:
     found = found_by(said)
-    assert found is not None and word_for(*found) == word
+    assert found is not None and object_noun(*found) == word
 
 
 @pytest.mark.parametrize("said", ["natural", "original 500 ml", "cookie cream", "kaiser", "conference", "2 litres"])
 def test_what_is_printed_on_packs_is_no_thing_alone(said: str) -> None:
-    assert lookup(said) is None
+    assert find_prior(said) is None
 
 
 @pytest.mark.parametrize("said", [None, "", "  ", "mug rack", "flux capacitor", "unknown", "mug_01.obj", "??"])
 def test_lookup_says_nothing_of_what_it_does_not_know(said: str | None) -> None:
-    assert lookup(said) is None
+    assert find_prior(said) is None
 
 
 def test_lookup_tells_what_stands_and_what_holds_things() -> None:
-    assert lookup("mug").stands and lookup("mug").container
-    assert lookup("fork").stands is False and not lookup("fork").container
-    assert not lookup("bottle").container
+    assert find_prior("mug").stands and find_prior("mug").container
+    assert find_prior("fork").stands is False and not find_prior("fork").container
+    assert not find_prior("bottle").container
 
 
 @pytest.mark.parametrize(
     ("said", "level"), [("toy truck", True), ("shoe", True), ("toy rocket", False), ("can", False)]
 )
 def test_lookup_tells_what_stands_with_its_long_axis_level(said: str, level: bool) -> None:
-    prior = lookup(said)
+    prior = find_prior(said)
     assert prior is not None and prior.stands and prior.level is level
 
 
@@ -220,7 +220,7 @@ def test_an_interval_out_of_order_is_refused() -> None:
 
 def test_an_unknown_form_is_named_with_the_nearest() -> None:
     with pytest.raises(ManiTwinError, match="did you mean 'bottle'"):
-        priors._prior("flask", {"form": "botle", "surface": "glass"}, "test", {}, {"bottle": {}, "box": {}})
+        priors._build_prior("flask", {"form": "botle", "surface": "glass"}, "test", {}, {"bottle": {}, "box": {}})
 
 
 def test_the_unknown_prior_is_wide_and_says_so() -> None:
@@ -235,7 +235,7 @@ def test_the_unknown_prior_is_wide_and_says_so() -> None:
      ("a black stapler", "stapler", None)],
 )  # fmt: skip
 def test_what_is_only_about_as_large_is_a_thing_of_its_own(said: str, category: str, like: str | None) -> None:
-    prior = lookup(said)
+    prior = find_prior(said)
     assert prior is not None and (prior.category, prior.like) == (category, like)
     if like is not None:
         relative = load_priors()[like]
@@ -261,7 +261,7 @@ def test_no_alias_is_another_things_name_in_the_singular_or_plural() -> None:
     ],
 )  # fmt: skip
 def test_what_is_used_or_made_otherwise_is_no_alias(said: str, category: str) -> None:
-    found = lookup(said)
+    found = find_prior(said)
     assert found is not None and found.category == category
 
 
@@ -275,17 +275,19 @@ def test_what_is_used_or_made_otherwise_is_no_alias(said: str, category: str) ->
     ],
 )  # fmt: skip
 def test_numbers_and_colours_behind_a_thing_say_nothing(said: str, category: str) -> None:
-    found = lookup(said)
+    found = find_prior(said)
     assert found is not None and found.category == category
 
 
 @pytest.mark.parametrize("said", ["obj_000001", "blue", "v2", "1", "mug rack", "mug rack 2"])
 def test_numbers_and_colours_alone_are_no_thing(said: str) -> None:
-    assert lookup(said) is None
+    assert find_prior(said) is None
 
 
 def test_a_number_keeps_its_point_and_a_name_does_not() -> None:
-    assert normalised("No. 2 tube, 1.5 cm") == "no 2 tube" and normalised("Disk 1.5 cm v.2.") == "disk 1.5 cm v 2"
+    assert (
+        normalise_name("No. 2 tube, 1.5 cm") == "no 2 tube" and normalise_name("Disk 1.5 cm v.2.") == "disk 1.5 cm v 2"
+    )
 
 
 def test_what_stands_behind_a_colon_is_the_thing_where_what_is_before_is_none() -> None:
@@ -294,9 +296,9 @@ def test_what_stands_behind_a_colon_is_the_thing_where_what_is_before_is_none() 
         ("mug: blue pen", "mug"),
         ("shop: aisle 3: red mug", "mug"),
     ):
-        found = lookup(name)
+        found = find_prior(name)
         assert found is not None and found.category == category
-    assert lookup("shop:") is None
+    assert find_prior("shop:") is None
 
 
 def test_a_cone_of_a_road_is_no_geometric_solid() -> None:
@@ -305,7 +307,7 @@ def test_a_cone_of_a_road_is_no_geometric_solid() -> None:
         ("orange traffic cone", "traffic cone"),
         ("cone", "geometric solid"),
     ):
-        found = lookup(name)
+        found = find_prior(name)
         assert found is not None and found.category == category
 
 
@@ -316,14 +318,14 @@ def test_a_peg_of_metal_or_for_a_hole_is_no_clothes_peg() -> None:
         ("peg", "clothespin"),
         ("wood clothes peg", "clothespin"),
     ):
-        found = lookup(name)
+        found = find_prior(name)
         assert found is not None and found.category == category
-    assert [part.label for part in lookup("metal peg").functional] == ["end", "middle", "other end"]
+    assert [part.label for part in find_prior("metal peg").functional] == ["end", "middle", "other end"]
 
 
 def test_form_of_an_alias_is_that_of_its_head_noun() -> None:
     """A plastic spoon is told apart as a spoon, and a thermometer gun held as a pistol."""
-    plastic, spoon, gun = lookup("plastic spoon"), lookup("spoon"), lookup("thermometer gun")
+    plastic, spoon, gun = find_prior("plastic spoon"), find_prior("spoon"), find_prior("thermometer gun")
     assert plastic is not None and spoon is not None and gun is not None
     assert [part.label for part in plastic.functional] == [part.label for part in spoon.functional]
     assert gun.parts == "pistol"
@@ -338,22 +340,22 @@ def test_materials_are_matter_and_no_things() -> None:
 
 def test_no_point_is_named_that_a_shape_does_not_show() -> None:
     for name in ("orange", "egg", "peach"):  # round, and sold without a stem
-        assert "stem" not in " ".join(part.label for part in lookup(name).functional)
-    assert "stem end" in [part.label for part in lookup("apple").functional]
-    assert [part.label for part in lookup("toy").functional] == ["body", "base"]
-    assert "chuck" in [part.label for part in lookup("cordless drill").functional]
-    assert [part.label for part in lookup("stamp").functional] == ["handle", "base"]
-    assert [part.label for part in lookup("security camera").functional] == ["lens", "body", "base"]
+        assert "stem" not in " ".join(part.label for part in find_prior(name).functional)
+    assert "stem end" in [part.label for part in find_prior("apple").functional]
+    assert [part.label for part in find_prior("toy").functional] == ["body", "base"]
+    assert "chuck" in [part.label for part in find_prior("cordless drill").functional]
+    assert [part.label for part in find_prior("stamp").functional] == ["handle", "base"]
+    assert [part.label for part in find_prior("security camera").functional] == ["lens", "body", "base"]
 
 
 def test_only_what_is_operated_has_controls() -> None:
     for name in ("carabiner", "hose connector", "yo yo", "goggles", "wall socket", "pacifier"):
-        assert "controls" not in [part.label for part in lookup(name).functional]
-    assert "controls" in [part.label for part in lookup("faucet").functional]
+        assert "controls" not in [part.label for part in find_prior(name).functional]
+    assert "controls" in [part.label for part in find_prior("faucet").functional]
 
 
 def test_a_pipe_is_a_long_round_thing_with_two_ends() -> None:
-    pipe = lookup("steel pipe")
+    pipe = find_prior("steel pipe")
     assert [part.label for part in pipe.functional] == ["end", "middle", "other end"]
     hint = hint_from_name("steel pipe")
     assert hint.round and not hint.boxy
@@ -371,12 +373,12 @@ def test_a_pipe_is_a_long_round_thing_with_two_ends() -> None:
     ],
 )
 def test_letters_with_marks_are_not_cut_out_of_a_name(said: str, plain: str) -> None:
-    assert normalised(said) == plain
+    assert normalise_name(said) == plain
 
 
 def test_lookup_finds_what_is_spelt_with_its_marks() -> None:
-    prior = lookup("Sauté Pân")
-    assert prior is not None and prior == lookup("saute pan")
+    prior = find_prior("Sauté Pân")
+    assert prior is not None and prior == find_prior("saute pan")
 
 
 def test_what_is_named_in_the_plural_says_what_it_is_counted_by() -> None:
@@ -403,13 +405,13 @@ def test_what_is_named_in_the_plural_says_what_it_is_counted_by() -> None:
     ],
 )
 def test_furniture_is_known_and_what_is_a_toy_of_it_is_a_toy(said: str, category: str) -> None:
-    found = lookup(said)
+    found = find_prior(said)
     assert found is not None and found.category == category
 
 
 @pytest.mark.parametrize("said", ["stand", "music stand", "cake stand"])
 def test_a_stand_of_something_else_is_no_phone_stand(said: str) -> None:
-    assert lookup(said) is None
+    assert find_prior(said) is None
 
 
 @pytest.mark.parametrize(
@@ -425,18 +427,18 @@ def test_a_stand_of_something_else_is_no_phone_stand(said: str) -> None:
     ],
 )
 def test_words_written_together_or_apart_are_one_name(said: str, category: str | None) -> None:
-    found = lookup(said)
+    found = find_prior(said)
     assert (found and found.category) == category
 
 
 @pytest.mark.parametrize("name", ["sphere", "wooden sphere", "torus", "hemisphere"])
 def test_round_solids_of_trials_are_known(name: str) -> None:
-    found = lookup(name)
+    found = find_prior(name)
     assert found is not None and found.category == "geometric solid"
 
 
 def test_a_crate_is_no_round_bin_and_food_that_has_a_base_stands_on_it() -> None:
-    crate, tote = lookup("wooden crate"), lookup("storage bin")
+    crate, tote = find_prior("wooden crate"), find_prior("storage bin")
     assert crate is not None and tote is not None
     assert (crate.category, tote.category) == ("crate", "tote") and crate.container and "box" in crate.shape
     for name, category, stands in (
@@ -444,9 +446,9 @@ def test_a_crate_is_no_round_bin_and_food_that_has_a_base_stands_on_it() -> None
         ("cupcake", "muffin", True),
         ("bagel", "bagel", False),
     ):
-        found = lookup(name)
+        found = find_prior(name)
         assert found is not None and (found.category, found.stands) == (category, stands)
-    assert (phone := lookup("desk phone")) is not None and phone.category == "telephone"
+    assert (phone := find_prior("desk phone")) is not None and phone.category == "telephone"
 
 
 NOT_POURED = (
@@ -510,18 +512,18 @@ def test_names_in_other_languages_are_those_of_one_thing_and_of_nothing_in_engli
     assert {"de", "fr", "es", "it", "zh", "ja"} == {language for words in abroad.values() for language in words}
     for category, by_language in abroad.items():
         for word in (word for words in by_language.values() for word in words):
-            assert _found_in_english(word) is None, word
-            prior = lookup(word)
+            assert _find_english(word) is None, word
+            prior = find_prior(word)
             assert prior is not None and prior.category == category, word
 
 
 def test_the_whole_name_in_another_language_is_found_and_called_so_in_english() -> None:
     for name in ("Tasse", "eine Tasse", "taza", "Una taza", "tazza", "杯子", "コーヒーカップ", "ｶｯﾌﾟ"):
         found = found_by(name)
-        assert found is not None and word_for(*found) == "cup"
-    assert named("Tasse") is None and lookup("Tasse Kaffee") is None and lookup("Tassenschrank") is None
-    assert lookup("L'assiette") is lookup("plate") and lookup("大象") is None
-    assert lookup("mug") is not None and word_for(*(found_by("coffee mug") or pytest.fail())) == "mug"
+        assert found is not None and object_noun(*found) == "cup"
+    assert named("Tasse") is None and find_prior("Tasse Kaffee") is None and find_prior("Tassenschrank") is None
+    assert find_prior("L'assiette") is find_prior("plate") and find_prior("大象") is None
+    assert find_prior("mug") is not None and object_noun(*(found_by("coffee mug") or pytest.fail())) == "mug"
 
 
 def test_large_things_of_the_road_and_of_walls_are_themselves_and_their_toys_are_toys() -> None:
@@ -540,21 +542,21 @@ def test_large_things_of_the_road_and_of_walls_are_themselves_and_their_toys_are
         ("knives", "knife"),
         ("scarves", "scarf"),
     ):
-        prior = lookup(name)
+        prior = find_prior(name)
         assert prior is not None and prior.category == category, name
 
 
 def test_names_that_a_name_is_a_word_of_are_told() -> None:
     assert names_with("beer")[:2] == ["beer bottle", "beer can"] and names_with("Cola 500 ml") == ["cola can"]
-    assert names_with("Gear part")[0] == "gear" and lookup("Gear part") is None
+    assert names_with("Gear part")[0] == "gear" and find_prior("Gear part") is None
     assert names_with("thingamajig") == names_with("500 ml") == names_with("大象") == []
 
 
 def test_balls_of_games_have_numbers_of_their_own() -> None:
     """A bowling ball was any ball: of 7 cm and 80 g."""
-    bowling, beach, gym = (lookup(name) for name in ("red bowling ball", "beach ball", "gym ball"))
+    bowling, beach, gym = (find_prior(name) for name in ("red bowling ball", "beach ball", "gym ball"))
     assert bowling is not None and bowling.longest_axis_m.typical > 0.2 and bowling.mass_kg.typical > 4
     assert beach is not None and beach.longest_axis_m.low >= 0.2 and beach.mass_kg.high < 0.5
     assert gym is not None and gym.longest_axis_m.typical > 0.5
-    ping_pong = lookup("ping pong ball")
+    ping_pong = find_prior("ping pong ball")
     assert ping_pong is not None and ping_pong.mass_kg.high < 0.01, "it had a racquetball's"

@@ -14,7 +14,7 @@ from handmade import cup, cylinder, subject
 from manitwin.formats.meshes.read import read_mesh
 from manitwin.geometry.poses import transform
 from manitwin.geometry.repair.cascade import repair
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.annotators.rules import RulesAnnotator, estimate_physical
 
@@ -49,13 +49,19 @@ def test_a_larger_one_weighs_more() -> None:
 
 def test_mass_stays_in_the_categorys_interval_where_the_volume_says_more() -> None:
     filled_in = cylinder(0.04, 0.1)
-    assert 2300 * filled_in.volume > lookup("mug").mass_kg.high
+    assert 2300 * filled_in.volume > find_prior("mug").mass_kg.high
     estimate = mass(filled_in, "mug")
-    assert lookup("mug").mass_kg.low <= estimate.low <= estimate.value <= estimate.high <= lookup("mug").mass_kg.high
+    assert (
+        find_prior("mug").mass_kg.low
+        <= estimate.low
+        <= estimate.value
+        <= estimate.high
+        <= find_prior("mug").mass_kg.high
+    )
 
 
 def test_a_volume_that_no_such_thing_has_leaves_the_mass_open_and_not_certain() -> None:
-    prior, block = lookup("mug"), trimesh.creation.box([0.12, 0.12, 0.12])
+    prior, block = find_prior("mug"), trimesh.creation.box([0.12, 0.12, 0.12])
     assert prior.bulk_density_kg_m3 is not None and prior.bulk_density_kg_m3.low * block.volume > prior.mass_kg.high
     heavy = mass(block, "mug")
     assert heavy.value == prior.mass_kg.high and heavy.low == prior.mass_kg.typical and heavy.high > 1.2 * heavy.value
@@ -67,7 +73,7 @@ def test_a_volume_that_no_such_thing_has_leaves_the_mass_open_and_not_certain() 
 
 def test_an_answer_at_the_end_of_what_its_volume_leaves_open_is_not_sure_of_itself() -> None:
     """Small headphones of little matter: their volume and the lightest such things left 90 to 98 g, and nothing between."""
-    prior = lookup("headphones")
+    prior = find_prior("headphones")
     assert prior.bulk_density_kg_m3 is not None
     slight = trimesh.creation.box([0.13, 0.12, 0.0978 / (prior.bulk_density_kg_m3.high * 0.13 * 0.12)])
     estimate = mass(slight, "headphones")
@@ -76,7 +82,7 @@ def test_an_answer_at_the_end_of_what_its_volume_leaves_open_is_not_sure_of_itse
 
 def test_interval_goes_on_beyond_the_answer_where_size_and_volume_contradict_each_other() -> None:
     thin = trimesh.creation.box([0.27, 0.1, 0.007])  # as long as a large toy, with the matter of a small one
-    prior = lookup("toy")
+    prior = find_prior("toy")
     assert prior.bulk_density_kg_m3 is not None
     estimate = mass(thin, "toy")
     assert estimate.value > prior.bulk_density_kg_m3.high * thin.volume
@@ -87,7 +93,7 @@ def test_interval_goes_on_beyond_the_answer_where_size_and_volume_contradict_eac
 
 
 def test_a_volume_by_a_guessed_size_says_less_than_one_by_a_known_one() -> None:
-    prior = lookup("drill")
+    prior = find_prior("drill")
     assert prior.bulk_density_kg_m3 is not None
     side_m = (0.7 * prior.mass_kg.typical / prior.bulk_density_kg_m3.typical / prior.longest_axis_m.typical) ** 0.5
     light = trimesh.creation.box([prior.longest_axis_m.typical, side_m, side_m])  # as long as usual, of less matter
@@ -109,7 +115,7 @@ def test_a_volume_by_a_guessed_size_says_less_than_one_by_a_known_one() -> None:
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 2.5])
 def test_by_a_guessed_size_no_thing_is_denser_than_such_things_are(share: float) -> None:
-    prior = lookup("pliers")
+    prior = find_prior("pliers")
     bulk = prior.bulk_density_kg_m3
     assert bulk is not None
     length_m = prior.longest_axis_m.typical
@@ -122,7 +128,7 @@ def test_by_a_guessed_size_no_thing_is_denser_than_such_things_are(share: float)
 
 @pytest.mark.parametrize("name", ["drill", "pliers", "serving tray"])
 def test_interval_by_a_guessed_size_holds_what_larger_and_smaller_ones_weigh(name: str) -> None:
-    prior = lookup(name)
+    prior = find_prior(name)
     assert prior.bulk_density_kg_m3 is not None
     length_m = prior.longest_axis_m.typical
     side_m = (prior.mass_kg.typical / prior.bulk_density_kg_m3.typical / length_m) ** 0.5
@@ -146,27 +152,27 @@ def test_a_thing_without_a_name_is_about_as_large_and_heavy_as_what_it_may_be() 
     said, anything = estimate_physical(guessed, None), estimate_physical(replace(guessed, likely=()), None)
     assert anything.longest_axis_m.source == "prior:unknown" and anything.longest_axis_m.value == 0.15
     assert said.longest_axis_m.source == said.mass_kg.source == "prior:likeliest"
-    orange = lookup("orange").longest_axis_m.typical
+    orange = find_prior("orange").longest_axis_m.typical
     assert orange < said.longest_axis_m.value < 0.12 and said.longest_axis_m.low < orange < said.longest_axis_m.high
     assert said.longest_axis_m.high > 0.3, "with the rest it may be anything"
     assert said.bulk_density_kg_m3.value > anything.bulk_density_kg_m3.value, "fruit is denser than most things"
-    assert estimate_physical(guessed, lookup("can")).longest_axis_m.source == "prior:can", "a name counts first"
+    assert estimate_physical(guessed, find_prior("can")).longest_axis_m.source == "prior:can", "a name counts first"
 
 
 def test_only_a_mesh_of_unknown_scale_gets_a_size() -> None:
     mesh = cylinder(0.5, 1.5)
-    assert estimate_physical(subject(mesh, "can"), lookup("can")).longest_axis_m is None
-    said = estimate_physical(subject(mesh, "can", metric=False), lookup("can"))
+    assert estimate_physical(subject(mesh, "can"), find_prior("can")).longest_axis_m is None
+    said = estimate_physical(subject(mesh, "can", metric=False), find_prior("can"))
     assert said.longest_axis_m.source == "prior:can"
-    assert said.longest_axis_m.value == lookup("can").longest_axis_m.typical
-    assert lookup("can").mass_kg.low <= said.mass_kg.value <= lookup("can").mass_kg.high
+    assert said.longest_axis_m.value == find_prior("can").longest_axis_m.typical
+    assert find_prior("can").mass_kg.low <= said.mass_kg.value <= find_prior("can").mass_kg.high
 
 
 def test_a_closed_skin_of_a_hollow_thing_gets_a_wall_and_a_full_one_none() -> None:
     ball = trimesh.creation.icosphere(radius=0.033)
-    assert estimate_physical(subject(ball, "tennis ball"), lookup("tennis ball")).wall_thickness_m == 0.003
-    assert estimate_physical(subject(ball, "baseball"), lookup("baseball")).wall_thickness_m is None
-    assert estimate_physical(subject(cup(), "cup"), lookup("cup")).wall_thickness_m is None
+    assert estimate_physical(subject(ball, "tennis ball"), find_prior("tennis ball")).wall_thickness_m == 0.003
+    assert estimate_physical(subject(ball, "baseball"), find_prior("baseball")).wall_thickness_m is None
+    assert estimate_physical(subject(cup(), "cup"), find_prior("cup")).wall_thickness_m is None
 
 
 def _book(leaves: int, opened: bool = False) -> trimesh.Trimesh:
@@ -223,6 +229,8 @@ def test_photographed_objects_that_were_weighed_are_in_their_categorys_interval(
     outside = [
         (row["category"], row["mass_kg"])
         for row in rows
-        if not lookup(row["category"]).mass_kg.low <= float(row["mass_kg"]) <= lookup(row["category"]).mass_kg.high
+        if not find_prior(row["category"]).mass_kg.low
+        <= float(row["mass_kg"])
+        <= find_prior(row["category"]).mass_kg.high
     ]
     assert len(rows) >= 6 and len(outside) <= 1, outside

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from handmade import cup, cylinder, subject
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.priors import load_materials
 from manitwin.models.annotators.rules import RulesAnnotator
-from manitwin.models.annotators.stated_matter import prior_as_named
+from manitwin.models.annotators.stated_matter import prior_in_named_material
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ from manitwin.models.annotators.stated_matter import prior_as_named
     ],
 )
 def test_a_name_says_the_material(name: str, material: str, surface: str) -> None:
-    prior = prior_as_named(name)
+    prior = prior_in_named_material(name)
     assert prior is not None and (prior.material, prior.surface) == (material, surface)
     assert prior.friction_static == load_materials()[surface].friction_static
     assert prior.source.startswith("prior:") and prior.source.endswith(f" of {prior.stated}")
@@ -77,11 +77,15 @@ def test_a_name_says_the_material(name: str, material: str, surface: str) -> Non
     ],
 )
 def test_a_word_that_says_nothing_of_the_whole_changes_nothing(name: str) -> None:
-    assert prior_as_named(name) == lookup(name) is not None
+    assert prior_in_named_material(name) == find_prior(name) is not None
 
 
 def test_without_a_known_name_nothing_is_said() -> None:
-    assert prior_as_named(None) is None and prior_as_named("steel wool") is None and prior_as_named("") is None
+    assert (
+        prior_in_named_material(None) is None
+        and prior_in_named_material("steel wool") is None
+        and prior_in_named_material("") is None
+    )
 
 
 def test_a_mug_of_sheet_weighs_what_the_metal_does() -> None:
@@ -113,13 +117,13 @@ def test_a_steel_mug_as_thick_as_one_of_clay_is_hollow_between_two_skins() -> No
 
 def test_imitations_of_food_are_light() -> None:
     # YCB 011_banana, of plastic: 0.066 kg; 0.19 m long
-    prior = prior_as_named("plastic banana")
+    prior = prior_in_named_material("plastic banana")
     assert prior is not None and prior.mass_kg.low < 0.066 < prior.mass_kg.high
     assert prior.mass_kg.typical == pytest.approx(0.066, rel=0.3)
 
 
 def test_what_is_full_weighs_its_contents_whatever_it_is_of() -> None:
-    usual, steel = lookup("water bottle"), prior_as_named("stainless steel water bottle")
+    usual, steel = find_prior("water bottle"), prior_in_named_material("stainless steel water bottle")
     assert usual is not None and steel is not None and steel.material == "stainless steel"
     assert steel.mass_kg.typical == pytest.approx(usual.mass_kg.typical, rel=0.1)
     assert steel.mass_kg.low > 3 * usual.mass_kg.low, "an empty one is of steel alone"
@@ -131,7 +135,7 @@ def test_what_is_full_weighs_its_contents_whatever_it_is_of() -> None:
     "name", ["wooden comb", "wooden ruler", "oak cutting board", "wooden dice", "walnut bowl", "wooden tray"]
 )
 def test_what_is_of_wood_is_no_denser_than_wood(name: str) -> None:
-    prior = prior_as_named(name)
+    prior = prior_in_named_material(name)
     assert prior is not None and prior.bulk_density_kg_m3 is not None
     assert 200 < prior.bulk_density_kg_m3.typical <= 720 and prior.bulk_density_kg_m3.high < 1100
 

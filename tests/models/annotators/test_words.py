@@ -10,10 +10,10 @@ import pytest
 import trimesh
 
 from handmade import cylinder, mug, subject, visual
-from manitwin.models.annotators.prior_names import found_by, word_for
+from manitwin.models.annotators.descriptions import article, is_metal, joined, size_words, write_captions
+from manitwin.models.annotators.prior_names import found_by, object_noun
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.annotators.rules import RulesAnnotator
-from manitwin.models.annotators.words import article, is_metal, joined, size_words, write_captions
 from manitwin.twin.record import Language
 
 
@@ -173,7 +173,7 @@ def test_captions_tell_different_facts() -> None:
 )
 def test_what_is_in_a_package_is_told_with_it(said: str, told: str) -> None:
     found = found_by(said)
-    assert found is not None and word_for(*found) == told
+    assert found is not None and object_noun(*found) == told
 
 
 @pytest.mark.parametrize(
@@ -189,6 +189,6 @@ def test_what_is_in_a_package_is_told_with_it(said: str, told: str) -> None:
 def test_what_a_name_is_counted_by_is_not_told_twice(said: str, told: str) -> None:
     found = found_by(said)
     assert found is not None
-    assert write_captions(word_for(*found), found[0], "metal", "", "round", "10 x 5 x 3 cm, palm-sized")[0].startswith(
-        told
-    )
+    assert write_captions(object_noun(*found), found[0], "metal", "", "round", "10 x 5 x 3 cm, palm-sized")[
+        0
+    ].startswith(told)

@@ -6,16 +6,16 @@ import cv2
 import numpy as np
 import pytest
 
-from manitwin.models.annotators.prior_names import lookup, named
+from manitwin.models.annotators.prior_names import find_prior, named
 from manitwin.models.classifiers.classifier import TEMPERATURE, classify, softmax
 from manitwin.models.classifiers.efficientnet_lite import SIDE_PX, logits
 from manitwin.models.classifiers.imagenet import CLASSES, load_limits, load_names
 from manitwin.models.classifiers.object_pictures import object_pictures
 from manitwin.models.classifiers.size_evidence import size_likelihoods
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import visual_parts
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.object_sampling import make_object
+from manitwin.models.generators.templates.template_object import visual_parts
 from manitwin.render.cameras import framing_camera
 from manitwin.render.renderer import shared_renderer
 
@@ -23,7 +23,7 @@ from manitwin.render.renderer import shared_renderer
 def rendered(text: str, seed: int = 0) -> np.ndarray:
     templates = load_templates()
     wanted = read_text(text, templates)
-    parts = visual_parts(make(templates[wanted.category], wanted, np.random.default_rng(seed)))
+    parts = visual_parts(make_object(templates[wanted.category], wanted, np.random.default_rng(seed)))
     points = np.concatenate([part.vertices for part in parts])
     camera = framing_camera(points, azimuth_deg=-70, elevation_deg=25, fov_y_deg=30, width_px=256, height_px=256)
     (frame,) = shared_renderer().render(parts, [camera])
@@ -32,7 +32,7 @@ def rendered(text: str, seed: int = 0) -> np.ndarray:
 
 def test_every_name_is_one_that_the_priors_know_and_no_class_counts_twice() -> None:
     table = load_names()
-    assert all(named(name) is not None and lookup(name) is not None for name in (*table.names, *table.general))
+    assert all(named(name) is not None and find_prior(name) is not None for name in (*table.names, *table.general))
     assert table.members.shape == (len(table.names), CLASSES) and table.members.sum(axis=0).max() == 1
     assert table.general_members.sum(axis=0).max() == 1
     assert load_limits().keys() == {*table.names, *table.general} and max(load_limits().values()) <= 1

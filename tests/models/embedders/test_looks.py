@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from manitwin.models.classifiers.efficientnet_lite import FEATURE_LAYERS, FEATURES, features, load_weights, logits
+from manitwin.models.embedders.appearance import COLOR_WEIGHT, LENGTH, NETWORK, appearance_descriptor
 from manitwin.models.embedders.foreground import foreground
-from manitwin.models.embedders.looks import COLOR_WEIGHT, LENGTH, NETWORK, look_of
 
 RED, BLUE = (190, 30, 30), (30, 40, 190)
 
@@ -32,17 +32,19 @@ def test_features_end_in_what_the_classifier_classifies() -> None:
 
 
 def test_a_look_depends_on_the_thing_and_not_on_what_is_behind_it() -> None:
-    look = look_of(*drawn(RED, (40, 90, 40)))
+    look = appearance_descriptor(*drawn(RED, (40, 90, 40)))
     assert look.shape == (LENGTH,) and np.linalg.norm(look) == pytest.approx(1, abs=1e-5)
     behind, smaller, blue = (
-        look_of(*drawn(RED, (200, 200, 220))), look_of(*drawn(RED, (40, 90, 40), 60)), look_of(*drawn(BLUE, (40, 90, 40)))
-    )  # fmt: skip
+        appearance_descriptor(*drawn(RED, (200, 200, 220))),
+        appearance_descriptor(*drawn(RED, (40, 90, 40), 60)),
+        appearance_descriptor(*drawn(BLUE, (40, 90, 40))),
+    )
     assert look @ behind > 0.99 and look @ smaller > 0.9
     assert look @ blue < 0.85
     assert look[NETWORK:] @ blue[NETWORK:] < 0.1 * COLOR_WEIGHT, "red and blue share no bin of colours"
-    assert (look_of(*drawn(RED, (40, 90, 40))) == look).all()
+    assert (appearance_descriptor(*drawn(RED, (40, 90, 40))) == look).all()
     with pytest.raises(ValueError, match="3 pixels"):
-        look_of(np.zeros((8, 8, 3), np.uint8), np.eye(8) * (np.arange(8) < 3))
+        appearance_descriptor(np.zeros((8, 8, 3), np.uint8), np.eye(8) * (np.arange(8) < 3))
 
 
 def test_the_thing_is_told_by_transparency_or_by_the_border() -> None:

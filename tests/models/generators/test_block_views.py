@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from manitwin.models.generators.lift.block_views import WAYS, block_views, outline_points
+from manitwin.models.generators.lift.block_views import DIRECTION_COUNT, block_views, outline_points
 from manitwin.models.generators.templates.fitting.view import View, normalised
 
 SIDE_PX = 600
@@ -37,7 +37,7 @@ def test_a_block_is_among_those_that_its_outline_may_be_of(
     nearest = found[int(np.argmin(errors))]
     assert np.degrees(nearest.view.elevation_rad) == pytest.approx(elevation_deg, abs=4)
     assert np.degrees(nearest.view.yaw_rad) == pytest.approx(yaw_deg, abs=5)
-    assert nearest.off < 0.002
+    assert nearest.silhouette_error < 0.002
 
 
 def test_the_view_of_a_block_shows_its_outline() -> None:
@@ -45,10 +45,10 @@ def test_the_view_of_a_block_shows_its_outline() -> None:
     best = block_views(mask, perspective=0.32, focal_spread=0.45)[0]
     corners, _, _ = normalised(np.array(list(product((0, best.width), (0, best.depth), (0, 1.0)))))
     flat, _ = best.view.project(corners)
-    angles = 2 * np.pi * np.arange(WAYS) / WAYS
+    angles = 2 * np.pi * np.arange(DIRECTION_COUNT) / DIRECTION_COUNT
     ways = np.stack([np.cos(angles), np.sin(angles)])
     off = (flat @ ways).max(0) - (outline_points(mask) @ ways).max(0)
-    assert np.sqrt((off**2).mean()) == pytest.approx(best.off, rel=1e-6)
+    assert np.sqrt((off**2).mean()) == pytest.approx(best.silhouette_error, rel=1e-6)
 
 
 def test_no_block_has_the_outline_of_a_disc_or_of_a_triangle() -> None:

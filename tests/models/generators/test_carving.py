@@ -13,14 +13,14 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from kept_opinions import kept_opinions
-from manitwin.cli.arguments import degrees_of
+from manitwin.cli.arguments import parse_azimuths_deg
 from manitwin.cli.main import app
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.generators.lift import posed_carving
-from manitwin.models.generators.lift.carving import BOXY_POWER, ROUND_POWER, Carved, carve
-from manitwin.models.generators.lift.several import from_views
+from manitwin.models.generators.lift.carving import BOXY_POWER, ROUND_POWER, CarvedSolid, carve
+from manitwin.models.generators.lift.multi_view_generation import generate_from_views
 from manitwin.models.generators.lift.surface import to_manifold
 from manitwin.models.generators.protocol import PhotoView
 from manitwin.pipeline.carved_photos import carve_photos
@@ -61,7 +61,7 @@ def _on_ground(rgba: np.ndarray) -> np.ndarray:
     )
 
 
-def _carved(mesh: trimesh.Trimesh, turns: list[float], power: float) -> Carved:
+def _carved(mesh: trimesh.Trimesh, turns: list[float], power: float) -> CarvedSolid:
     photos = [(f"{turn:.0f}.png", _photo(mesh, turn, size_px=200 + int(turn))) for turn in turns]
     return carve(photos, turns, power=power)
 
@@ -69,7 +69,7 @@ def _carved(mesh: trimesh.Trimesh, turns: list[float], power: float) -> Carved:
 def test_two_photos_of_a_round_thing_make_it_round() -> None:
     carved = _carved(CYLINDER, [0, 90], ROUND_POWER)
     assert to_manifold(carved.surface).volume() == pytest.approx(np.pi * 0.25**2, rel=0.06)
-    assert len(to_manifold(carved.surface).decompose()) == 1 and min(carved.covered) > 0.97
+    assert len(to_manifold(carved.surface).decompose()) == 1 and min(carved.covered_shares) > 0.97
     assert np.ptp(carved.surface.vertices, axis=0) == pytest.approx([0.5, 1.0, 0.5], abs=0.03)
 
 
@@ -120,10 +120,10 @@ def test_a_photo_that_cannot_be_cut_out_is_left_out_as_in_a_build(tmp_path: Path
         paths.append(tmp_path / folder / "photo.png")
         Image.fromarray(_photo(BOX, turn)).save(paths[-1])
     whole = carve_photos(paths, [0, 90, 45], "box")
-    assert [outline.name for outline in whole.carved.outlines] == ["left/photo.png", "right/photo.png", "top/photo.png"]
+    assert [outline.name for outline in whole.carved.photos] == ["left/photo.png", "right/photo.png", "top/photo.png"]
     Image.new("RGB", (96, 96), (120, 130, 140)).save(paths[2])
     made = carve_photos(paths, [0, 90, 45], "box")
-    assert [outline.name for outline in made.carved.outlines] == ["left/photo.png", "right/photo.png"]
+    assert [outline.name for outline in made.carved.photos] == ["left/photo.png", "right/photo.png"]
     assert made.findings[0].startswith("left out: top/photo.png: ")
     Image.new("RGB", (96, 96), (120, 130, 150)).save(paths[1])
     with pytest.raises(
@@ -156,7 +156,7 @@ def test_alpha_channels_count_as_in_a_build(tmp_path: Path) -> None:
     two = [photo.copy() for photo in plain]
     two[1][5:85, 5:80, 3] = 255
 
-    def carved(pictures: list[np.ndarray], name: str | None) -> tuple[Carved, str]:
+    def carved(pictures: list[np.ndarray], name: str | None) -> tuple[CarvedSolid, str]:
         for number, picture in enumerate(pictures):
             Image.fromarray(picture).save(tmp_path / f"{number}.png")
         made = carve_photos([tmp_path / "0.png", tmp_path / "1.png"], [0, 90], name)
@@ -200,7 +200,7 @@ def _views(mesh: trimesh.Trimesh, turns: tuple[float, ...], *, stated: bool) -> 
 
 
 def test_views_of_a_nameless_thing_are_carved_at_their_stated_turns() -> None:
-    made = from_views(_views(BOX, (0.0, 90.0, 180.0), stated=True), None)
+    made = generate_from_views(_views(BOX, (0.0, 90.0, 180.0), stated=True), None)
     assert made.notes["primitive"] == "visual hull" and made.notes["confidence"] > 0.95
     assert np.ptp(made.part.vertices, axis=0) == pytest.approx([10 / 12, 5 / 12, 1.0], abs=0.03)
     assert made.unseen_share < 0.6
@@ -210,15 +210,15 @@ def test_views_of_a_nameless_thing_are_carved_at_their_stated_turns() -> None:
 def test_outlines_alone_do_not_tell_turns_but_a_round_thing_needs_none() -> None:
     for mesh, name in ((BOX, None), (CYLINDER, None), (BOX, "orange")):
         with pytest.raises(Rejected, match=r"0\.png, 90\.png: .*give the camera's turns with --turns"):
-            from_views(_views(mesh, (0.0, 90.0), stated=False), name)
-    made = from_views(_views(CYLINDER, (0.0, 90.0), stated=False), "orange")
+            generate_from_views(_views(mesh, (0.0, 90.0), stated=False), name)
+    made = generate_from_views(_views(CYLINDER, (0.0, 90.0), stated=False), "orange")
     assert made.notes["primitive"] == "revolution"
     assert made.part.volume == pytest.approx(np.pi * 0.25**2, rel=0.06)
 
 
 def test_views_from_one_direction_and_its_opposite_are_refused() -> None:
     with pytest.raises(Rejected, match="from the side"):
-        from_views(_views(BOX, (0.0, 180.0), stated=True), None)
+        generate_from_views(_views(BOX, (0.0, 180.0), stated=True), None)
 
 
 def test_the_command_says_what_it_needs(tmp_path: Path) -> None:
@@ -234,13 +234,13 @@ def test_the_command_says_what_it_needs(tmp_path: Path) -> None:
 
 
 def test_turns_go_on_by_equal_steps_where_dots_say_so() -> None:
-    assert degrees_of("0,90,180", 3) == [0, 90, 180]
-    assert degrees_of("0,-10, ...", 4) == [0, -10, -20, -30]
-    assert degrees_of("0,30,75,...", 3) == [0, 30, 75]
+    assert parse_azimuths_deg("0,90,180", 3) == [0, 90, 180]
+    assert parse_azimuths_deg("0,-10, ...", 4) == [0, -10, -20, -30]
+    assert parse_azimuths_deg("0,30,75,...", 3) == [0, 30, 75]
     for value, photos, told in (
         ("0,...", 3, "give two or more angles"),
         ("...", 3, "not a list of degrees"),
         ("0,1,2,...", 2, "2 photos"),
     ):
         with pytest.raises(UsageError, match=told):
-            degrees_of(value, photos)
+            parse_azimuths_deg(value, photos)

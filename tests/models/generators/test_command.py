@@ -17,13 +17,13 @@ from PIL import Image
 from rehearsed_jobs import photo
 
 from manitwin.config import BuildConfig, GenerateConfig
-from manitwin.engine.job_memory import NoMemory
+from manitwin.engine.job_memory import NullJobMemory
 from manitwin.errors import BadReply, ConfigError, Rejected, Unavailable, Unsupported
 from manitwin.models.fakes.meshes import bottle, glb, truncated
 from manitwin.models.generators.command import CommandGenerator
 from manitwin.models.generators.protocol import GenerationRequest
 from manitwin.models.generators.run import run_generator
-from manitwin.models.services.refusal import Gone
+from manitwin.models.services.refusal import NotFound
 
 NASTY = """a "blue" bottle; rm -rf $HOME `id` $(id) {out} {seed} 'x' \\ --help & | > /tmp/x
 second line"""
@@ -129,7 +129,7 @@ def test_failure_is_told_by_its_last_line(tmp_path: Path) -> None:
     fails = script(tmp_path, "import sys; print('loading', file=sys.stderr); sys.exit('no object found\\n\\n')")
     generator = command(sys.executable, fails, "{image}", "{out}")
     with pytest.raises(Rejected, match=r"script\.py ended with status 1: no object found"):
-        run_generator(generator, photo(), tmp_path, settings=GenerateConfig(attempts=1), jobs=NoMemory())
+        run_generator(generator, photo(), tmp_path, settings=GenerateConfig(attempts=1), jobs=NullJobMemory())
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_output_has_to_be_a_mesh(tmp_path: Path, content: bytes | None, words: s
     job_id = generator.submit(photo())
     with pytest.raises(BadReply, match=words):
         generator.fetch(job_id, tmp_path)
-    with pytest.raises(Gone):
+    with pytest.raises(NotFound):
         generator.poll(job_id)
 
 
@@ -183,7 +183,7 @@ def test_truncated_mesh_is_rejected(tmp_path: Path) -> None:
     text = f"import shutil, sys; shutil.copy({str(tmp_path / 'half.glb')!r}, sys.argv[-1])"
     generator = command(sys.executable, script(tmp_path, text), "{image}", "{out}")
     with pytest.raises(Rejected):
-        run_generator(generator, photo(), tmp_path, settings=GenerateConfig(attempts=1), jobs=NoMemory())
+        run_generator(generator, photo(), tmp_path, settings=GenerateConfig(attempts=1), jobs=NullJobMemory())
 
 
 @pytest.mark.parametrize(

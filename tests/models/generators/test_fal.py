@@ -15,7 +15,7 @@ from manitwin.models.fakes.faults import ALWAYS, Faults
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.generators.fal import FalGenerator, first_glb
 from manitwin.models.generators.run import run_generator
-from manitwin.models.services.refusal import Gone, Unanswered
+from manitwin.models.services.refusal import AnswerLost, NotFound
 
 TRELLIS, RODIN, HUNYUAN = "fal-ai/trellis", "fal-ai/hyper3d/rodin", "fal-ai/hunyuan3d-v3/text-to-3d"
 
@@ -89,10 +89,10 @@ def test_job_goes_on_in_another_process(queue: FakeFal, tmp_path: Path, polls: i
         ("out_of_credit", AccessDenied, "Exhausted balance", 1),
         ("rate_limited", RateLimited, "Too many requests", 3),
         ("server_error", Unavailable, "Internal server error", 1),
-        ("disconnects", Unanswered, "it is unknown whether", 1),
-        ("hangs", Unanswered, "it is unknown whether", 1),
-        ("not_json", Unanswered, "JSON object", 1),
-        ("wrong_schema", Unanswered, "no status_url", 1),
+        ("disconnects", AnswerLost, "it is unknown whether", 1),
+        ("hangs", AnswerLost, "it is unknown whether", 1),
+        ("not_json", AnswerLost, "JSON object", 1),
+        ("wrong_schema", AnswerLost, "no status_url", 1),
     ],
 )
 def test_trouble_at_a_submit(queue: FakeFal, fault: str, error: Any, words: str, requests: int) -> None:
@@ -165,7 +165,7 @@ def test_endless_job_stays_under_way_and_forgotten_one_is_gone(queue: FakeFal) -
         job_id = client(server).submit(photo())
         assert {client(server).poll(job_id).state for _ in range(6)} == {"running"}
         queue._requests.clear()
-        refused(Gone, lambda: client(server).poll(job_id))
+        refused(NotFound, lambda: client(server).poll(job_id))
 
 
 @pytest.mark.parametrize(("fault", "error"), [("expired_link", BadReply), ("empty_mesh", BadReply)])
@@ -217,7 +217,7 @@ def test_address_that_is_no_address_of_the_queue_is_refused(queue: FakeFal, addr
 def test_address_of_no_address_is_an_answer_that_was_lost(queue: FakeFal) -> None:
     queue.names = {"status_url": "x" * 9000}
     with FakeServer(queue) as server:
-        refused(Unanswered, lambda: client(server).submit(photo()))
+        refused(AnswerLost, lambda: client(server).submit(photo()))
     assert len(server.requests) == 1  # it may be at work on it: nothing is paid for twice
 
 

@@ -12,9 +12,9 @@ from manitwin.errors import Rejected
 from manitwin.models.generators.lift.filled_holes import reject_filled_holes
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.drawing import edges_between, silhouette
-from manitwin.models.generators.templates.fitting.evidence import evidence_of
-from manitwin.models.generators.templates.fitting.fit import Fitted, fitted, made_of
-from manitwin.models.generators.templates.fitting.least_squares import Placed
+from manitwin.models.generators.templates.fitting.evidence import extract_evidence
+from manitwin.models.generators.templates.fitting.fit import TemplateFit, assemble_fit, build_fitted_object
+from manitwin.models.generators.templates.fitting.least_squares import PlacedView
 from manitwin.models.generators.templates.fitting.residual import Residual
 from manitwin.models.generators.templates.fitting.view import View, normalised
 
@@ -22,16 +22,16 @@ SIDE, BOX = 512, 220.0
 GROUND, DARK, PALE = (205, 200, 190), (40, 40, 45), (190, 186, 180)
 
 
-def _seen(category: str) -> tuple[Fitted, np.ndarray]:
+def _seen(category: str) -> tuple[TemplateFit, np.ndarray]:
     """Return a thing seen from above, and its silhouette (512, 512) bool."""
     template = load_templates()[category]
-    made = made_of(template, template.typical())
+    made = build_fitted_object(template, template.typical_measures())
     view = View(yaw_rad=0.0, elevation_rad=1.5, roll_rad=0.3, perspective=0.1)
     flat, _ = view.project(normalised(made.mesh.vertices)[0])
     center = (SIDE / 2, SIDE / 2)
     mask = silhouette(flat * BOX + np.array(center), made.mesh.faces, edges_between(made.mesh.faces), SIDE) > 0
     left = Residual(iou=0.76, outline=0.02, edges=0.5, shading=0.5, hidden=0.0, edge_px=10)
-    found = fitted(made, Placed(view, False), left, evidence_of(_cut_out(mask, mask)))
+    found = assemble_fit(made, PlacedView(view, False), left, extract_evidence(_cut_out(mask, mask)))
     return replace(found, center_px=center, box_px=BOX), mask
 
 

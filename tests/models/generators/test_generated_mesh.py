@@ -22,12 +22,12 @@ from manitwin.models.fakes.meshes import (
     usdz,
     webp_glb,
 )
-from manitwin.models.generators.generated_mesh import as_glb, flaw
+from manitwin.models.generators.generated_mesh import convert_to_glb, find_flaw
 
 
 def _flaw(tmp_path: Path, data: bytes, name: str = "made.glb") -> str | None:
     (tmp_path / name).write_bytes(data)
-    return flaw(tmp_path / name)
+    return find_flaw(tmp_path / name)
 
 
 def _with(vertices: np.ndarray, faces: np.ndarray) -> bytes:
@@ -80,13 +80,13 @@ def test_words_of_each_refusal(tmp_path: Path) -> None:
 
 def test_glb_stays_as_it_is_whatever_it_is_called(tmp_path: Path) -> None:
     (tmp_path / "made.usdz").write_bytes(webp_glb())
-    assert as_glb(tmp_path / "made.usdz") == webp_glb()
+    assert convert_to_glb(tmp_path / "made.usdz") == webp_glb()
 
 
 def test_usdz_with_two_meshes_keeps_both_with_their_textures(tmp_path: Path) -> None:
     body, cap = body_and_cap(3)
     (tmp_path / "made.usdz").write_bytes(usdz([body, cap]))
-    (tmp_path / "generated.glb").write_bytes(as_glb(tmp_path / "made.usdz"))
+    (tmp_path / "generated.glb").write_bytes(convert_to_glb(tmp_path / "made.usdz"))
     file = read_mesh(tmp_path / "generated.glb")
     assert file.up == "y" and [part.metadata["name"] for part in file.parts] == ["body", "cap"]
     for part, surface in zip(file.parts, (body, cap), strict=True):
@@ -111,7 +111,7 @@ def test_unit_of_a_usdz_is_minded(tmp_path: Path) -> None:
     mesh.CreateFaceVertexIndicesAttr(surface.faces.reshape(-1).tolist())
     stage.GetRootLayer().Save()
     UsdUtils.CreateNewUsdzPackage(str(tmp_path / "cm.usda"), str(tmp_path / "cm.usdz"))
-    (tmp_path / "m.glb").write_bytes(as_glb(tmp_path / "cm.usdz"))
+    (tmp_path / "m.glb").write_bytes(convert_to_glb(tmp_path / "cm.usdz"))
     (part,) = read_glb(tmp_path / "m.glb")
     assert part.extents == pytest.approx([0.068, 0.068, 0.2], abs=1e-6)
 
@@ -119,8 +119,8 @@ def test_unit_of_a_usdz_is_minded(tmp_path: Path) -> None:
 def test_broken_file_is_a_bad_reply(tmp_path: Path) -> None:
     (tmp_path / "made.usdz").write_bytes(truncated(usdz([bottle()])))
     with pytest.raises(BadReply, match=r"made\.usdz"):
-        as_glb(tmp_path / "made.usdz")
+        convert_to_glb(tmp_path / "made.usdz")
     (tmp_path / "empty.glb").write_bytes(b"")
     with pytest.raises(BadReply, match="zero bytes"):
-        as_glb(tmp_path / "empty.glb")
+        convert_to_glb(tmp_path / "empty.glb")
     assert glb([bottle()])[:4] == b"glTF"

@@ -19,9 +19,9 @@ from manitwin.models.annotators.vlm.template_reader import TemplateReader
 from manitwin.models.fakes.openai_chat import FakeOpenAi
 from manitwin.models.fakes.server import FakeServer
 from manitwin.models.generators.lift import LiftGenerator
-from manitwin.models.generators.lift.rounds import in_two_rounds
+from manitwin.models.generators.lift.review_rounds import review_twice
 from manitwin.models.generators.protocol import Generated, GenerationRequest
-from manitwin.models.generators.templates.filled import Filled
+from manitwin.models.generators.templates.filled_template import FilledTemplate
 from manitwin.models.registry import create
 from manitwin.models.vlm.protocol import Picture, Question, Reply, Turn, Usage
 from manitwin.pipeline.generator_input import chosen_generator
@@ -147,7 +147,7 @@ def test_text_gets_what_the_plain_reader_does_not_know(tmp_path: Path) -> None:
     measures = result.notes["measures"]
     assert (measures["height_m"], measures["width"], measures["handle"]) == (0.08, 1.0, 0.4)
     assert result.metric and result.known is not None and result.known.source == "template:mug, filled in by vlm:eyes-1"
-    assert result.known.made_of_parts and result.known.inertia_kg_m2 is not None
+    assert result.known.has_part_masses and result.known.inertia_kg_m2 is not None
     assert len(eyes.asked) == 3
     again = made(guided(Eyes("mug", eyes.measures, YES)), tmp_path, text=f"{SQUAT}, 9 cm tall")
     assert again.notes["measures"]["height_m"] == pytest.approx(0.09, rel=0.02), "a stated length comes first"
@@ -194,11 +194,11 @@ def test_there_are_two_rounds_at_most(right: tuple[bool, ...], looks: int) -> No
 
     def compare(thing: str, before: str) -> Likeness:
         seen.append((thing, before))
-        return Likeness(next(answers), "words", Filled("mug"))
+        return Likeness(next(answers), "words", FilledTemplate("mug"))
 
-    agreed = in_two_rounds("first", compare, lambda thing, _: (f"{thing}, corrected", "It was changed."))
-    assert len(seen) == looks == len(agreed.rounds) and agreed.right == right[looks - 1]
-    assert seen[0] == ("first", FIRST_LOOK) and (agreed.kept == "first") == (looks == 1)
+    agreed = review_twice("first", compare, lambda thing, _: (f"{thing}, corrected", "It was changed."))
+    assert len(seen) == looks == len(agreed.rounds) and agreed.accepted == right[looks - 1]
+    assert seen[0] == ("first", FIRST_LOOK) and (agreed.final == "first") == (looks == 1)
     assert looks == 1 or "said: 'words'. It was changed. This is the last look." in seen[1][1]
 
 

@@ -17,7 +17,7 @@ from manitwin.models.fakes.hunyuan3d import FakeHunyuan3d
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.generators.hunyuan3d import Hunyuan3dGenerator
 from manitwin.models.generators.run import run_generator
-from manitwin.models.services.refusal import Gone, Unanswered
+from manitwin.models.services.refusal import AnswerLost, NotFound
 
 PLAIN: dict[str, str | int | float | bool] = {"texture": False}
 
@@ -99,7 +99,7 @@ def test_generated_job_of_another_process_is_gone_and_asked_again(tmp_path: Path
         (note,) = jobs.notes.values()
         assert "generate:" in note
         driven(client(server, options=PLAIN), tmp_path, jobs, settings(options=PLAIN))
-        refused(Gone, lambda: client(server, options=PLAIN).poll("generate:0123"))
+        refused(NotFound, lambda: client(server, options=PLAIN).poll("generate:0123"))
     assert hunyuan.sent == 2
 
 
@@ -133,10 +133,10 @@ def test_seed_stays_in_the_servers_range(tmp_path: Path) -> None:
     ("fault", "error", "requests"),
     [
         ("server_error", Unavailable, 1),
-        ("disconnects", Unanswered, 1),
-        ("hangs", Unanswered, 1),
-        ("not_json", Unanswered, 1),
-        ("wrong_schema", Unanswered, 1),
+        ("disconnects", AnswerLost, 1),
+        ("hangs", AnswerLost, 1),
+        ("not_json", AnswerLost, 1),
+        ("wrong_schema", AnswerLost, 1),
     ],
 )
 def test_trouble_at_a_submit(fault: str, error: Any, requests: int) -> None:

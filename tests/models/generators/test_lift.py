@@ -16,10 +16,10 @@ from manitwin.errors import Rejected, Unsupported
 from manitwin.formats.glb import read_glb
 from manitwin.formats.image_file import read_image
 from manitwin.models.generators.lift import LiftGenerator
-from manitwin.models.generators.lift.hint import hint_from_name, why_not_round
+from manitwin.models.generators.lift.hint import hint_from_name, roundness_conflict
 from manitwin.models.generators.lift.inflation import inflate
-from manitwin.models.generators.lift.lifting import Lifted, ShapeHint, lift
-from manitwin.models.generators.lift.made_photo import fitted_or_lifted, from_photo
+from manitwin.models.generators.lift.lifting import LiftedObject, ShapeHint, lift
+from manitwin.models.generators.lift.photo_generation import fit_or_lift, generate_from_photo
 from manitwin.models.generators.lift.surface import tip_angle_deg, to_manifold
 from manitwin.models.generators.protocol import GenerationRequest
 from manitwin.models.matting import matte_photo
@@ -45,7 +45,7 @@ def _turned(points: list[tuple[float, float]], degrees: float) -> list[tuple[flo
     return [(300 + c * (x - 300) - s * (y - 300), 300 + s * (x - 300) + c * (y - 300)) for x, y in points]
 
 
-def _check_contract(lifted: Lifted) -> None:
+def _check_contract(lifted: LiftedObject) -> None:
     surface = lifted.surface
     solid = to_manifold(surface)
     low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
@@ -223,11 +223,11 @@ def test_text_is_refused_with_a_remedy() -> None:
         LiftGenerator().submit(GenerationRequest(None, "a red unicorn", None, seed=0))
 
 
-def _lifted_photo(path: Path) -> Lifted:
+def _lifted_photo(path: Path) -> LiftedObject:
     return lift(matte_photo(read_image(path, max_side_px=2048).pixels, path.name).rgba, NO_HINT)
 
 
-def _check_same_geometry(first: Lifted, second: Lifted) -> None:
+def _check_same_geometry(first: LiftedObject, second: LiftedObject) -> None:
     assert first.notes["primitive"] == second.notes["primitive"]
     extents = [np.ptp(lifted.surface.vertices, axis=0) for lifted in (first, second)]
     assert extents[0] == pytest.approx(extents[1], abs=0.01)
@@ -299,12 +299,12 @@ def painted(shape: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray
 
 def test_a_ball_with_its_mirror_image_is_no_ball() -> None:
     one = painted(lambda x, y: np.hypot(x, y) < 0.3)
-    assert from_photo(one, "tennis ball").notes["primitive"] != ""
+    assert generate_from_photo(one, "tennis ball").notes["primitive"] != ""
     beside = painted(lambda x, y: (np.hypot(x, y + 0.2) < 0.2) | (np.hypot(x, y - 0.18) < 0.2))
     with pytest.raises(
         Rejected, match=r"2 bellies .* or one with its mirror image, and one tennis ball has not"
     ) as caught:
-        from_photo(beside, "tennis ball")
+        generate_from_photo(beside, "tennis ball")
     assert caught.value.reason == "several_objects"
 
 
@@ -325,9 +325,9 @@ def test_a_can_seen_nearly_from_above_is_no_egg() -> None:
     around = np.linspace(0, 2 * math.pi, 200)
     askew = _turned(list(zip(300 + 140 * np.cos(around), 300 + 200 * np.sin(around), strict=True)), 14)
     with pytest.raises(Rejected, match="its outline is an ellipse, as a can has none from the side"):
-        fitted_or_lifted(None, _drawn(askew), "can")
-    assert fitted_or_lifted(None, _drawn(_turned([(220, 100), (380, 100), (380, 500), (220, 500)], 14)), "can")
-    assert fitted_or_lifted(None, _drawn(askew), "apple")
+        fit_or_lift(None, _drawn(askew), "can")
+    assert fit_or_lift(None, _drawn(_turned([(220, 100), (380, 100), (380, 500), (220, 500)], 14)), "can")
+    assert fit_or_lift(None, _drawn(askew), "apple")
 
 
 @pytest.mark.slow
@@ -339,8 +339,8 @@ def test_a_tin_with_its_shadow_and_letters_for_holes_is_no_cushion() -> None:
         return np.asarray((open_lid | shadow) & ~letters)
 
     with pytest.raises(Rejected, match="a can is a cylinder, and none has this outline from any side"):
-        from_photo(painted(tin), "tin")
-    assert from_photo(painted(tin), "toy").notes["primitive"] == "inflation"
+        generate_from_photo(painted(tin), "tin")
+    assert generate_from_photo(painted(tin), "toy").notes["primitive"] == "inflation"
 
 
 @pytest.mark.parametrize(("name", "rests"), [("lemon", "lying"), ("tomato", "standing")])
@@ -370,10 +370,10 @@ def test_a_round_fruit_is_turned_about_the_axis_that_gives_its_usual_volume(name
 def test_what_is_round_by_its_name_has_a_round_things_sides(
     name: str | None, extents: list[float], refused: bool
 ) -> None:
-    assert (why_not_round(name, np.array(extents)) is not None) == refused
+    assert (roundness_conflict(name, np.array(extents)) is not None) == refused
 
 
 def test_a_helmet_is_no_solid_dome() -> None:
     outline = [(140 + 160 * (1 - math.cos(at)), 380 - 170 * math.sin(at)) for at in np.linspace(0, math.pi, 60)]
     with pytest.raises(Rejected, match="hollow from below"):
-        from_photo(_drawn(outline), "hard hat")
+        generate_from_photo(_drawn(outline), "hard hat")

@@ -10,11 +10,11 @@ import pytest
 import trimesh
 
 from manitwin.config import GenerateConfig
-from manitwin.engine.job_memory import NoMemory
+from manitwin.engine.job_memory import NullJobMemory
 from manitwin.formats.glb import read_glb, write_glb
 from manitwin.models.generators.lift import LiftGenerator
-from manitwin.models.generators.lift.lifting import Lifted, ShapeHint, lift
-from manitwin.models.generators.lift.made_photo import textured_part
+from manitwin.models.generators.lift.lifting import LiftedObject, ShapeHint, lift
+from manitwin.models.generators.lift.photo_generation import textured_part
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.protocol import GenerationRequest
 from manitwin.models.generators.run import run_generator
@@ -53,13 +53,13 @@ def _lettered(outline: list[tuple[int, int]], *, cap: bool = False) -> np.ndarra
 def test_what_the_photo_sees_askew_takes_none_of_its_pixels(kind: str) -> None:
     surface = lift(_lettered(SHAPES[kind][0]), SHAPES[kind][1]).surface
     normals = trimesh.Trimesh(surface.vertices, surface.faces, process=False).face_normals
-    seen = surface.seen()
+    seen = surface.visible_faces()
     beside = seen & (np.abs(normals[:, 1]) < 0.9)  # no end on which it stands
     assert normals[beside, 2].min() > 0.2, "its pixels would be streaks"
     assert seen[normals[:, 2] > 0.5].mean() > 0.98
 
 
-def _views(lifted: Lifted, folder: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _views(lifted: LiftedObject, folder: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the front, the back as the front's camera would see it through the thing, and where both show it."""
     path = folder / "lifted.glb"
     path.write_bytes(write_glb([textured_part(lifted)]))
@@ -159,7 +159,7 @@ def test_inside_of_a_container_shows_no_letters() -> None:
     inward = (
         np.einsum("ij,ij->i", mesh.face_normals[:, [0, 2]], mesh.triangles_center[:, [0, 2]]) < -0.5 * axis_distance
     )
-    assert inward.sum() > 500 and not surface.seen()[inward].any()
+    assert inward.sum() > 500 and not surface.visible_faces()[inward].any()
 
 
 def test_same_photo_gives_the_same_bytes_and_one_closed_solid(tmp_path: Path) -> None:
@@ -174,7 +174,7 @@ def test_same_photo_gives_the_same_bytes_and_one_closed_solid(tmp_path: Path) ->
 
 def test_generator_says_how_much_the_photo_did_not_show(tmp_path: Path) -> None:
     request = GenerationRequest(_lettered(SHAPES["revolution"][0]), None, "can", seed=0)
-    made = run_generator(LiftGenerator(), request, tmp_path, settings=GenerateConfig(), jobs=NoMemory())
+    made = run_generator(LiftGenerator(), request, tmp_path, settings=GenerateConfig(), jobs=NullJobMemory())
     assert made.unseen_share is not None and 0.55 < made.unseen_share < 0.75  # half of the side, and both ends
     lifted = lift(_lettered(SHAPES["box"][0]), ShapeHint())
     width, height, depth = np.ptp(lifted.surface.vertices, axis=0)

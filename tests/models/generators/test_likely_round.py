@@ -11,7 +11,7 @@ import trimesh
 
 from manitwin.formats.glb import read_glb
 from manitwin.models.generators.lift.likely_round import is_likely_round
-from manitwin.models.generators.lift.made_photo import Job, from_photo
+from manitwin.models.generators.lift.photo_generation import LiftResult, generate_from_photo
 
 ROUND = (("screwdriver", 0.5), ("glass bottle", 0.2), ("spatula", 0.1))
 FLAT = (("spatula", 0.5), ("glass bottle", 0.2))
@@ -47,7 +47,7 @@ def _lying_bottle() -> np.ndarray:
     return np.asarray(cv2.warpAffine(rgba, turn, (640, 560), flags=cv2.INTER_NEAREST))
 
 
-def _thickness(job: Job, folder: Path) -> float:
+def _thickness(job: LiftResult, folder: Path) -> float:
     """Return the least of a job's sides over the second."""
     path = folder / "made.glb"
     path.write_bytes(job.glb)
@@ -59,7 +59,7 @@ def _thickness(job: Job, folder: Path) -> float:
 @pytest.mark.slow
 def test_a_bottle_that_is_cut_out_unevenly_is_round_by_its_likely_names(tmp_path: Path) -> None:
     photo = _lying_bottle()
-    flat, thick = from_photo(photo, None, likely=FLAT), from_photo(photo, None, likely=ROUND)
+    flat, thick = generate_from_photo(photo, None, likely=FLAT), generate_from_photo(photo, None, likely=ROUND)
     assert flat.notes["primitive"] == thick.notes["primitive"] == "inflation"
     assert thick.notes["depth_source"] == "round" and flat.notes["depth_source"] == "outline"
     assert _thickness(flat, tmp_path) < 0.75 < 0.85 < _thickness(thick, tmp_path)

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift.lobes import bellies, reject_several_round
-from manitwin.models.generators.lift.made_photo import from_photo
+from manitwin.models.generators.lift.photo_generation import generate_from_photo
+from manitwin.models.generators.lift.touching_round_objects import count_bulges, reject_several_round
 
 
 def _discs(*discs: tuple[int, int, int]) -> np.ndarray:
@@ -35,14 +35,14 @@ def _ellipse(long: int, short: int) -> np.ndarray:
     ids=["one", "long", "stem", "crown", "two", "a smaller one", "three"],
 )
 def test_bellies_are_counted_and_stems_and_crowns_are_none(mask: np.ndarray, count: int) -> None:
-    assert bellies(mask) == count
+    assert count_bulges(mask) == count
 
 
 def test_two_tomatoes_that_touch_are_no_tomato() -> None:
     two = _discs((150, 200, 100), (330, 200, 100))
     rgba = np.dstack([np.full((400, 500, 3), (200, 40, 30)), np.where(two, 255, 0)]).astype(np.uint8)
     with pytest.raises(Rejected, match="crop the photo to one") as caught:
-        from_photo(rgba, "beef tomato")
+        generate_from_photo(rgba, "beef tomato")
     assert caught.value.reason == "several_objects" and caught.value.stage == "generate"
 
 

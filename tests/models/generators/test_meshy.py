@@ -16,14 +16,14 @@ from PIL import Image
 from rehearsed_jobs import KEY, TEXT, KeptJobs, asked, check_key_is_nowhere, finished, made, photo, refused, settings
 
 from manitwin.config import BuildConfig
-from manitwin.engine.charges import counted
+from manitwin.engine.charges import record_charges
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Rejected, Unavailable
 from manitwin.models.fakes.faults import ALWAYS, Faults
 from manitwin.models.fakes.meshy import FakeMeshy
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.generators.meshy import MeshyGenerator
 from manitwin.models.generators.run import run_generator
-from manitwin.models.services.refusal import Unanswered
+from manitwin.models.services.refusal import AnswerLost
 
 IMAGE, TEXTS, FILE = "/openapi/v1/image-to-3d", "/openapi/v2/text-to-3d", "GET /files/ID/model.glb"
 
@@ -92,7 +92,7 @@ def test_refine_whose_answer_was_lost_is_found_and_not_paid_again(
                 meshy.faults = _CutAt("POST", server)
             try:
                 generator.poll(job_id)
-            except Unanswered:
+            except AnswerLost:
                 break
         meshy.faults = Faults()
         finished(client(server) if restarted else generator, job_id, tmp_path)
@@ -112,7 +112,7 @@ class _CutAt(Faults):
 
 def test_charged_once_over_a_crash(meshy: FakeMeshy, tmp_path: Path) -> None:
     jobs, config = KeptJobs(), settings(usd_per_job=0.5)
-    with FakeServer(meshy) as server, counted() as bill:
+    with FakeServer(meshy) as server, record_charges() as bill:
         meshy.faults = Faults({"job_never_ends": 1})
         with pytest.raises(Unavailable):
             run_generator(client(server, config), TEXT, tmp_path, settings=config.generate, jobs=jobs, sleep=_no_wait)
@@ -134,10 +134,10 @@ def _no_wait(seconds: float) -> None:
         ("out_of_credit", AccessDenied, "Insufficient funds", 1, []),
         ("rate_limited", RateLimited, "Too many requests", 3, [1, 1]),
         ("server_error", Unavailable, "Internal server error", 1, []),
-        ("disconnects", Unanswered, "it is unknown whether", 1, []),
-        ("hangs", Unanswered, "it is unknown whether", 1, []),
-        ("not_json", Unanswered, "JSON object", 1, []),
-        ("wrong_schema", Unanswered, "no result", 1, []),
+        ("disconnects", AnswerLost, "it is unknown whether", 1, []),
+        ("hangs", AnswerLost, "it is unknown whether", 1, []),
+        ("not_json", AnswerLost, "JSON object", 1, []),
+        ("wrong_schema", AnswerLost, "no result", 1, []),
     ],
 )
 def test_trouble_at_a_submit(

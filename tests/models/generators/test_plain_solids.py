@@ -13,11 +13,11 @@ import trimesh
 
 from kept_solids import kept_solids
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift import made_photo, nameless
+from manitwin.models.generators.lift import photo_generation, unnamed_shape
 from manitwin.models.generators.lift.hint import ShapeHint
-from manitwin.models.generators.lift.made_photo import from_photo
-from manitwin.models.generators.lift.plain_solids import PlainSolids, is_rather
-from manitwin.models.generators.templates.fitting.fit import Fitted, fit
+from manitwin.models.generators.lift.photo_generation import generate_from_photo
+from manitwin.models.generators.lift.plain_solids import PlainSolids, is_preferred_to_lifted
+from manitwin.models.generators.templates.fitting.fit import TemplateFit, fit
 from manitwin.models.generators.templates.fitting.residual import Residual
 from manitwin.models.generators.templates.fitting.view import View, normalised
 
@@ -62,7 +62,7 @@ def _circle(width_m: float) -> np.ndarray:
 
 
 def test_a_nameless_slab_on_a_table_lies_and_is_as_thick_as_it_looks() -> None:
-    job = from_photo(_seen(_rounded(0.20, 0.13, 0.02), 0.016, 30), None)
+    job = generate_from_photo(_seen(_rounded(0.20, 0.13, 0.02), 0.016, 30), None)
     assert job.notes["primitive"] == "slab" and job.notes["rests"] == "lying"
     assert job.notes["source"] == "plain solid fitted to the photo"
     assert job.known is None and not job.metric and "category" not in job.notes
@@ -80,9 +80,9 @@ def test_a_block_has_the_proportions_that_it_shows_from_whatever_side(
     sides: tuple[float, float, float], yaw_rad: float, elevation_deg: float
 ) -> None:
     width, depth, height = sides
-    found = made_photo.plain_solids(
+    found = photo_generation.plain_solids(
         _seen(_rounded(width, depth, 0.002), height, elevation_deg, yaw_rad=yaw_rad), ShapeHint(boxy=True)
-    ).close
+    ).close_fit
     assert found is not None and found.category in ("box", "cutting board") and found.upright
     extents = np.ptp(found.made.mesh.vertices, axis=0)
     across = np.sort(extents[:2])[::-1] / extents[2]
@@ -90,13 +90,13 @@ def test_a_block_has_the_proportions_that_it_shows_from_whatever_side(
 
 
 def test_a_block_seen_from_a_corner_is_no_body_of_revolution() -> None:
-    job = from_photo(_seen(_rounded(0.11, 0.11, 0.002), 0.11, 30, yaw_rad=0.7), None)
+    job = generate_from_photo(_seen(_rounded(0.11, 0.11, 0.002), 0.11, 30, yaw_rad=0.7), None)
     assert job.notes["primitive"] == "box" and job.notes["rests"] == "standing"
 
 
 def test_the_side_that_the_photo_shows_is_the_front() -> None:
     """A slab whose narrow side is towards the camera, whatever side of a slab the solid has there."""
-    job = from_photo(_seen(_rounded(0.13, 0.20, 0.02), 0.016, 35, yaw_rad=0.1), None)
+    job = generate_from_photo(_seen(_rounded(0.13, 0.20, 0.02), 0.016, 35, yaw_rad=0.1), None)
     width, depth, height = np.ptp(trimesh.load(io.BytesIO(job.glb), "glb").to_mesh().vertices, axis=0)[[0, 2, 1]]
     assert (
         job.notes["primitive"] == "slab"
@@ -107,42 +107,45 @@ def test_the_side_that_the_photo_shows_is_the_front() -> None:
 
 
 def test_a_cylinder_seen_from_above_is_as_high_as_it_is() -> None:
-    found = made_photo.plain_solids(_seen(_circle(0.08), 0.10, 35), ShapeHint()).close
+    found = photo_generation.plain_solids(_seen(_circle(0.08), 0.10, 35), ShapeHint()).close_fit
     assert found is not None and found.category == "can"
     extents = np.ptp(found.made.mesh.vertices, axis=0)
     assert extents[2] / extents[0] == pytest.approx(0.10 / 0.08, rel=0.08)
 
 
 def test_a_disc_whose_edge_is_seen_is_one_where_its_outline_alone_may_be_an_egg() -> None:
-    found = made_photo.plain_solids(_seen(_circle(0.10), 0.008, 30), ShapeHint()).close
+    found = photo_generation.plain_solids(_seen(_circle(0.10), 0.008, 30), ShapeHint()).close_fit
     assert found is not None and found.category == "coaster"
     ellipse = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
     cv2.ellipse(ellipse, (320, 320), (240, 130), 0, 0, 360, TOP, -1)
-    assert made_photo.plain_solids(ellipse, ShapeHint()).close is None
+    assert photo_generation.plain_solids(ellipse, ShapeHint()).close_fit is None
     with pytest.raises(Rejected, match="the outline is an ellipse"):
-        from_photo(ellipse, None)
+        generate_from_photo(ellipse, None)
 
 
 @pytest.mark.slow
 def test_a_rectangle_of_which_no_edge_is_seen_may_be_anything() -> None:
     front = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
     cv2.rectangle(front, (120, 60), (520, 580), TOP, -1)
-    assert made_photo.plain_solids(front, ShapeHint()).close is None
+    assert photo_generation.plain_solids(front, ShapeHint()).close_fit is None
 
 
 def test_what_is_as_thick_as_a_bowl_is_no_disc() -> None:
-    assert made_photo.plain_solids(_seen(_circle(0.10), 0.025, 55), ShapeHint(flat=True, round=True)).close is None
+    assert (
+        photo_generation.plain_solids(_seen(_circle(0.10), 0.025, 55), ShapeHint(flat=True, round=True)).close_fit
+        is None
+    )
 
 
 def test_what_is_said_to_be_open_or_of_another_form_is_not_tried() -> None:
     slab = _seen(_rounded(0.20, 0.13, 0.02), 0.016, 30)
-    assert made_photo.plain_solids(slab, ShapeHint(container=True)).close is None
-    assert made_photo.plain_solids(slab, ShapeHint(round=True)).close is None
-    assert made_photo.plain_solids(slab, ShapeHint(flat=True)).close is not None
+    assert photo_generation.plain_solids(slab, ShapeHint(container=True)).close_fit is None
+    assert photo_generation.plain_solids(slab, ShapeHint(round=True)).close_fit is None
+    assert photo_generation.plain_solids(slab, ShapeHint(flat=True)).close_fit is not None
 
 
 @pytest.fixture(scope="module")
-def torn_front() -> tuple[np.ndarray, Fitted]:
+def torn_front() -> tuple[np.ndarray, TemplateFit]:
     """The front of a box with a torn corner, which no rectangle explains whole, and a slab fitted to it."""
     front = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
     cv2.rectangle(front, (120, 60), (520, 580), TOP, -1)
@@ -156,18 +159,18 @@ def torn_front() -> tuple[np.ndarray, Fitted]:
     ("outline", "primitive"), [(0.0029, "box"), pytest.param(0.0018, "shape of template:book", marks=pytest.mark.slow)]
 )
 def test_the_front_of_a_box_is_a_likely_thing_seen_at_an_angle_only_where_that_explains_it_closely(
-    outline: float, primitive: str, torn_front: tuple[np.ndarray, Fitted], monkeypatch: pytest.MonkeyPatch
+    outline: float, primitive: str, torn_front: tuple[np.ndarray, TemplateFit], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     front, slab = torn_front
     close = dataclasses.replace(slab, residual=Residual(0.9862, outline, 0.2, 0.3, 0.0, 200))
-    monkeypatch.setattr(nameless, "fit", lambda *arguments, **options: close)
-    job = from_photo(front, None, likely=[("book", 0.4)])
+    monkeypatch.setattr(unnamed_shape, "fit", lambda *arguments, **options: close)
+    job = generate_from_photo(front, None, likely=[("book", 0.4)])
     assert job.notes["primitive"] == primitive
 
 
 @pytest.fixture(scope="module")
-def seen() -> Fitted:
-    found = made_photo.plain_solids(_seen(_circle(0.08), 0.10, 35), ShapeHint()).close
+def seen() -> TemplateFit:
+    found = photo_generation.plain_solids(_seen(_circle(0.08), 0.10, 35), ShapeHint()).close_fit
     assert found is not None
     return found
 
@@ -186,25 +189,25 @@ def seen() -> Fitted:
     ],
 )
 def test_a_plain_solid_is_preferred_to_a_lifted_outline_by_its_edges_or_its_exact_outline(
-    left: tuple[float, float, float], category: str, lifted: str, rather: bool, seen: Fitted
+    left: tuple[float, float, float], category: str, lifted: str, rather: bool, seen: TemplateFit
 ) -> None:
     plain = dataclasses.replace(seen, category=category, residual=Residual(*left, 0.3, 0.0, 200))
-    assert is_rather(plain, lifted) is rather
+    assert is_preferred_to_lifted(plain, lifted) is rather
 
 
 @pytest.mark.parametrize(("edges", "primitive"), [(0.3, "cylinder"), (0.55, "revolution")])
 def test_what_is_nearly_explained_is_the_plain_solid_where_its_edges_are_seen(
-    edges: float, primitive: str, seen: Fitted, monkeypatch: pytest.MonkeyPatch
+    edges: float, primitive: str, seen: TemplateFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     near = dataclasses.replace(seen, residual=Residual(0.97, 0.0035, edges, 0.3, 0.0, 200))
-    monkeypatch.setattr(made_photo, "plain_solids", lambda *arguments: PlainSolids(None, near))
-    monkeypatch.setattr(nameless, "turned_solid", lambda *arguments: None)  # beside it: test_turned_solid
-    assert from_photo(_seen(_circle(0.08), 0.10, 35), None).notes["primitive"] == primitive
+    monkeypatch.setattr(photo_generation, "plain_solids", lambda *arguments: PlainSolids(None, near))
+    monkeypatch.setattr(unnamed_shape, "turned_solid", lambda *arguments: None)  # beside it: test_turned_solid
+    assert generate_from_photo(_seen(_circle(0.08), 0.10, 35), None).notes["primitive"] == primitive
 
 
 @pytest.mark.slow
 def test_what_is_no_such_thing_as_its_template_makes_is_the_plain_solid_that_explains_it() -> None:
     thick = _seen(_rounded(0.20, 0.10, 0.03), 0.05, 30)
-    assert from_photo(thick, "envelope").notes["primitive"] == "slab"
+    assert generate_from_photo(thick, "envelope").notes["primitive"] == "slab"
     with pytest.raises(Rejected, match="seen at an angle"):
-        from_photo(thick, "frisbee")
+        generate_from_photo(thick, "frisbee")

@@ -15,11 +15,11 @@ import trimesh
 from manitwin.errors import Rejected
 from manitwin.formats.camera_poses.posed_camera import Lens, PosedCamera
 from manitwin.models.generators.lift import posed_carving, posed_views
-from manitwin.models.generators.lift.carved_solid import Carved
-from manitwin.models.generators.lift.made_of_views import MadeOfViews
+from manitwin.models.generators.lift.carved_solid import CarvedSolid
+from manitwin.models.generators.lift.multi_view_generation import generate_from_views
+from manitwin.models.generators.lift.multi_view_result import MultiViewResult
 from manitwin.models.generators.lift.posed_carving import carve_posed
-from manitwin.models.generators.lift.posed_views import sized_by_poses
-from manitwin.models.generators.lift.several import from_views
+from manitwin.models.generators.lift.posed_views import scale_to_poses
 from manitwin.models.generators.lift.surface import to_manifold
 from manitwin.models.generators.protocol import PhotoView
 from posed_things import FOCAL_PX, HEIGHT, PLACES, TO_OPENCV, WIDTH, pose_at, posed_photo
@@ -69,13 +69,13 @@ def _views(photos: Sequence[np.ndarray], cameras: Sequence[PosedCamera]) -> list
 
 
 @cache
-def _made() -> MadeOfViews:
+def _made() -> MultiViewResult:
     """What is made of the seven photos at their poses, in metres."""
-    return from_views(_views(PHOTOS, _cameras(POSES)), None, 1.0)
+    return generate_from_views(_views(PHOTOS, _cameras(POSES)), None, 1.0)
 
 
 @cache
-def _carved_straight() -> Carved:
+def _carved_straight() -> CarvedSolid:
     """What the seven photos are carved to."""
     cameras = _cameras(POSES)
     carved, _ = carve_posed(
@@ -96,8 +96,8 @@ def test_seven_photos_make_the_thing_in_metres() -> None:
 @pytest.mark.usefixtures("coarser")
 def test_the_unit_of_the_poses_is_that_of_the_size_and_without_one_there_is_none() -> None:
     scaled = [np.diag([1000, 1000, 1000, 1.0]) @ pose @ np.diag([0.001, 0.001, 0.001, 1]) for pose in POSES]
-    in_millimetres = from_views(_views(PHOTOS, _cameras(scaled)), None, 0.001)
-    without = from_views(_views(PHOTOS, _cameras(scaled)), None)
+    in_millimetres = generate_from_views(_views(PHOTOS, _cameras(scaled)), None, 0.001)
+    without = generate_from_views(_views(PHOTOS, _cameras(scaled)), None)
     assert np.ptp(in_millimetres.part.vertices, axis=0).max() == pytest.approx(0.1036, abs=0.002)
     assert not without.metric and np.ptp(without.part.vertices, axis=0).max() == pytest.approx(1.0)
 
@@ -107,7 +107,7 @@ def test_a_world_far_from_its_origin_makes_the_same() -> None:
     moved = [np.array(pose) for pose in POSES]
     for pose in moved:
         pose[:3, 3] += [300.0, -20.0, 7.0]
-    far = from_views(_views(PHOTOS, _cameras(moved)), None, 1.0)
+    far = generate_from_views(_views(PHOTOS, _cameras(moved)), None, 1.0)
     sizes = [np.ptp(each.part.vertices, axis=0) for each in (_made(), far)]
     assert sizes[0] == pytest.approx(sizes[1], abs=1e-4)
 
@@ -130,16 +130,16 @@ def test_colours_are_those_of_the_photos() -> None:
 def test_cameras_from_below_see_the_underside_and_nothing_is_cut_off() -> None:
     places = [*PLACES[:5], (20, -40, 0.3), (200, -60, 0.3)]
     poses = [pose_at(*place) for place in places]
-    made = from_views(_views([posed_photo(pose) for pose in poses], _cameras(poses)), None, 1.0)
+    made = generate_from_views(_views([posed_photo(pose) for pose in poses], _cameras(poses)), None, 1.0)
     assert np.ptp(made.part.vertices[:, 2]) > 0.113  # as high as the hull is, though the thing is not
 
 
 @pytest.mark.usefixtures("coarser")
 def test_a_photo_at_a_wrong_pose_is_left_out_of_many_and_named_of_few() -> None:
     cameras = _cameras([*POSES[:6], pose_at(20, 30, 0.25)])
-    assert from_views(_views(PHOTOS, cameras), None).notes["left_out"] == ["6.png"]
+    assert generate_from_views(_views(PHOTOS, cameras), None).notes["left_out"] == ["6.png"]
     with pytest.raises(Rejected, match=r"2\.png: its outline does not match its pose"):
-        from_views(_views(PHOTOS[:5], _cameras([*POSES[:2], pose_at(20, 30, 0.22), *POSES[3:5]])), None)
+        generate_from_views(_views(PHOTOS[:5], _cameras([*POSES[:2], pose_at(20, 30, 0.22), *POSES[3:5]])), None)
 
 
 @pytest.mark.parametrize(
@@ -153,20 +153,20 @@ def test_a_photo_at_a_wrong_pose_is_left_out_of_many_and_named_of_few() -> None:
 def test_another_convention_is_told(wrong: object, told: str) -> None:
     cameras = _cameras([wrong(pose) for pose in POSES])  # type: ignore[operator]
     with pytest.raises(Rejected, match=told):
-        from_views(_views(PHOTOS, cameras), None)
+        generate_from_views(_views(PHOTOS, cameras), None)
 
 
 def test_poses_of_other_photos_are_told_with_what_to_check() -> None:
     mixed = [PHOTOS[k] for k in (3, 0, 5, 1, 6, 2, 4)]
     with pytest.raises(Rejected, match="focal lengths are in pixels"):
-        from_views(_views(mixed, _cameras(POSES)), None)
+        generate_from_views(_views(mixed, _cameras(POSES)), None)
 
 
 def test_photos_from_one_direction_and_its_opposite_are_refused() -> None:
     poses = [pose_at(0, 5, 0.25), pose_at(6, 5, 0.3), pose_at(183, -5, 0.25)]
     photos = [posed_photo(pose) for pose in poses]
     with pytest.raises(Rejected, match="add a photo from the side"):
-        from_views(_views(photos, _cameras(poses)), None)
+        generate_from_views(_views(photos, _cameras(poses)), None)
 
 
 @pytest.mark.usefixtures("coarser")
@@ -187,7 +187,7 @@ def test_the_distortion_of_a_lens_is_undone(fisheye: bool) -> None:
     photos_of = [(camera.file, photo) for camera, photo in zip(cameras, photos, strict=True)]
     carved, _ = carve_posed(photos_of, cameras, [0.0] * 7)
     straight = _carved_straight()
-    assert min(carved.covered) > 0.97
+    assert min(carved.covered_shares) > 0.97
     assert to_manifold(carved.surface).volume() == pytest.approx(to_manifold(straight.surface).volume(), rel=0.05)
 
 
@@ -195,12 +195,12 @@ def test_the_distortion_of_a_lens_is_undone(fisheye: bool) -> None:
 @pytest.mark.usefixtures("coarser")
 def test_a_photo_that_was_scaled_since_makes_the_same() -> None:
     half = [cv2.resize(photo, (WIDTH // 2, HEIGHT // 2), interpolation=cv2.INTER_AREA) for photo in PHOTOS]
-    made = from_views(_views(half, _cameras(POSES)), None, 1.0)
+    made = generate_from_views(_views(half, _cameras(POSES)), None, 1.0)
     assert np.ptp(made.part.vertices, axis=0) == pytest.approx([0.084, 0.09, 0.1036], abs=0.003)
 
 
 def test_a_template_is_as_large_as_the_outlines_allow() -> None:
     views = _views(PHOTOS, _cameras(POSES))  # whose hull is 8.4 x 9 x 10.4
     for sides, height in (((0.4, 0.85, 1.0), 0.1036), ((0.8, 0.95, 1.0), 0.0948)):
-        sized = sized_by_poses(MadeOfViews(trimesh.creation.box(sides), {}, 0.0), views, 1.0)
+        sized = scale_to_poses(MultiViewResult(trimesh.creation.box(sides), {}, 0.0), views, 1.0)
         assert sized.metric and sized.part.extents == pytest.approx(np.array(sides) * height, rel=0.03)

@@ -8,7 +8,7 @@ import trimesh
 
 from manitwin.geometry.poses import transform
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.models.generators.lift.residual import explained, parallel_camera
+from manitwin.models.generators.lift.residual import compute_fit_quality, parallel_camera
 from manitwin.render.cameras import Camera, framing_camera
 from manitwin.render.raycast import cast_camera
 
@@ -30,9 +30,9 @@ def _picture(mesh: trimesh.Trimesh, camera: Camera) -> tuple[np.ndarray, np.ndar
 def test_a_solid_explains_its_own_picture_wholly() -> None:
     camera = _camera(BOX)
     mask, rgb = _picture(BOX, camera)
-    found = explained(BOX, camera, mask, rgb)
+    found = compute_fit_quality(BOX, camera, mask, rgb)
     assert found.silhouette_iou > 0.985 and found.edge_support == pytest.approx(1.0, abs=0.03)
-    assert found.residual == pytest.approx(1 - found.score) and found.score > 0.98
+    assert found.unexplained_share == pytest.approx(1 - found.score) and found.score > 0.98
 
 
 def test_a_solid_of_half_the_size_explains_a_quarter() -> None:
@@ -40,7 +40,7 @@ def test_a_solid_of_half_the_size_explains_a_quarter() -> None:
     mask, _ = _picture(BOX, camera)
     small = BOX.copy()
     small.apply_scale(0.5)
-    assert explained(small, camera, mask).silhouette_iou == pytest.approx(0.25, abs=0.02)
+    assert compute_fit_quality(small, camera, mask).silhouette_iou == pytest.approx(0.25, abs=0.02)
 
 
 def test_creases_that_the_photo_does_not_show_cost() -> None:
@@ -48,7 +48,7 @@ def test_creases_that_the_photo_does_not_show_cost() -> None:
     mask, _ = _picture(BOX, camera)
     rng = np.random.default_rng(0)
     even = (128 + rng.normal(0, 1.5, (240, 320, 3))).astype(np.uint8)
-    found = explained(BOX, camera, mask, even)
+    found = compute_fit_quality(BOX, camera, mask, even)
     assert found.edge_support is not None and found.edge_support < 0.5 and found.score < found.silhouette_iou - 0.05
 
 
@@ -57,11 +57,11 @@ def test_letters_on_a_ball_cost_nothing() -> None:
     camera = _camera(ball)
     mask, rgb = _picture(ball, camera)
     rgb[100:140:6, 130:190] = 0
-    assert explained(ball, camera, mask, rgb).edge_support is None
+    assert compute_fit_quality(ball, camera, mask, rgb).edge_support is None
 
 
 def test_a_parallel_camera_sees_pixels_where_they_are() -> None:
     solid = trimesh.creation.box((41, 21, 30), transform(np.eye(3), [60, -40, 0]))
     mask = np.zeros((100, 150), bool)
     mask[30:51, 40:81] = True
-    assert explained(solid, parallel_camera(mask.shape), mask).silhouette_iou > 0.94
+    assert compute_fit_quality(solid, parallel_camera(mask.shape), mask).silhouette_iou > 0.94

@@ -11,7 +11,12 @@ from manitwin.geometry.solids.shapes import cylinder, lathe
 from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.lift.lifting import lift
-from manitwin.models.generators.lift.revolution import end_elevations, half_widths, outline_of, turned_from
+from manitwin.models.generators.lift.revolution import (
+    end_elevations,
+    half_widths,
+    largest_profile,
+    projected_half_widths,
+)
 from manitwin.models.generators.lift.surface import tip_angle_deg, to_manifold
 from manitwin.render.cameras import framing_camera
 from manitwin.render.raycast import cast_camera
@@ -47,16 +52,16 @@ def test_flat_ends_tell_the_elevation_and_the_true_height(elevation_deg: float) 
     rows, widths, column = half_widths(mask)
     upper, lower = end_elevations(rows, widths, column)
     assert upper == pytest.approx(elevation_deg, abs=6) and lower == pytest.approx(elevation_deg, abs=6)
-    turned = turned_from(rows, widths, column, elevation_deg)
+    turned = largest_profile(rows, widths, column, elevation_deg)
     assert np.ptp(turned.heights) / (2 * turned.radii.max()) == pytest.approx(0.1 / 0.06, rel=0.05)
-    assert np.abs(outline_of(turned, rows) - widths).mean() < 1.5
+    assert np.abs(projected_half_widths(turned, rows) - widths).mean() < 1.5
 
 
 def test_the_profile_of_a_vase_seen_from_above_is_its_own() -> None:
     heights = np.linspace(0, 0.2, 60)
     radii = 0.04 + 0.015 * np.sin(heights / 0.2 * 2 * np.pi)
     mask = _photo(_mesh(lathe([(0, 0), *zip(radii, heights, strict=True), (0, 0.2)])), 20)[..., 3] > 0
-    turned = turned_from(*half_widths(mask), 20.0)
+    turned = largest_profile(*half_widths(mask), 20.0)
     at = np.linspace(0.1, 0.9, 9)
     scale = 0.2 / np.ptp(turned.heights)
     found = np.interp(at * 0.2, (turned.heights - turned.heights[0]) * scale, turned.radii * scale)
@@ -85,7 +90,9 @@ def test_what_the_photo_shows_of_the_inside_is_taken_from_it() -> None:
     inward = (normals[:, [0, 2]] * centers[:, [0, 2]]).sum(axis=1) < -0.2
     far, near = inward & (centers[:, 2] < -0.2), inward & (centers[:, 2] > 0.2)
     top = centers[:, 1] > 0.75 * centers[:, 1].max()
-    assert surface.seen()[far & top].mean() > 0.8 and near.sum() > 100 and not surface.seen()[near].any()
+    assert (
+        surface.visible_faces()[far & top].mean() > 0.8 and near.sum() > 100 and not surface.visible_faces()[near].any()
+    )
 
 
 def test_a_ball_is_a_ball_whatever_its_ends_say() -> None:

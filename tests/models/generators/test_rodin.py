@@ -17,7 +17,7 @@ from manitwin.formats.meshes.read import read_mesh
 from manitwin.models.fakes.faults import ALWAYS, Faults
 from manitwin.models.fakes.rodin import FakeRodin
 from manitwin.models.fakes.server import FakeServer, Request, Response
-from manitwin.models.generators.generated_mesh import as_glb
+from manitwin.models.generators.generated_mesh import convert_to_glb
 from manitwin.models.generators.rodin import URL, RodinGenerator
 
 
@@ -81,7 +81,7 @@ def test_usdz_with_two_meshes_is_the_papers_format(tmp_path: Path) -> None:
     with FakeServer(fake) as server:
         ran = run(RodinGenerator.from_spec(f"@{server.url}", settings), tmp_path, settings)
     assert ran.made is not None and ran.made.path.suffix == ".usdz"
-    (tmp_path / "generated.glb").write_bytes(as_glb(ran.made.path))
+    (tmp_path / "generated.glb").write_bytes(convert_to_glb(ran.made.path))
     assert len(read_mesh(tmp_path / "generated.glb").parts) == 2
 
 

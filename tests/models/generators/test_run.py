@@ -11,13 +11,13 @@ import pytest
 
 from generator_runs import photo_request
 from manitwin.config import GenerateConfig
-from manitwin.engine.charges import counted
-from manitwin.engine.job_memory import NoMemory
+from manitwin.engine.charges import record_charges
+from manitwin.engine.job_memory import NullJobMemory
 from manitwin.errors import AccessDenied, BadReply, Rejected, Unavailable
 from manitwin.models.fakes.meshes import bottle, glb, open_surface
 from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
 from manitwin.models.generators.run import request_digest, run_generator
-from manitwin.models.services.refusal import Gone, Unanswered
+from manitwin.models.services.refusal import AnswerLost, NotFound
 
 REQUEST = GenerationRequest(None, "a mug", None, seed=5)
 BOTTLE = glb([bottle()])
@@ -88,14 +88,14 @@ def test_endless_job_is_unavailable_within_the_limit_and_stays_remembered(tmp_pa
         _run(generator, tmp_path, jobs, sleep=waits.append)
     assert 60 < sum(waits) <= 100 and len(jobs.notes) == 1
     generator.states = (DONE,)
-    with counted() as bill:
+    with record_charges() as bill:
         _run(generator, tmp_path, jobs)
     assert generator.asked == [5] and bill.usd == 0.0
 
 
 def test_failed_job_is_asked_again_with_the_next_seed(tmp_path: Path) -> None:
     jobs, generator = Dictionary(), Scripted(JobState("failed", "out of memory"), DONE)
-    with counted() as bill:
+    with record_charges() as bill:
         made = _run(generator, tmp_path, jobs)
     assert generator.asked == [5, 6] and bill.usd == 0.5 and made.path.is_file()
     assert len(jobs.notes) == 1  # until the result is stored
@@ -136,13 +136,13 @@ def test_known_failures_are_not_paid_for_again_after_a_crash(tmp_path: Path) -> 
 def test_job_that_the_service_lost_is_submitted_again_once(tmp_path: Path) -> None:
     jobs, generator = Dictionary(), Scripted()
     _run(generator, tmp_path, jobs)
-    generator.states, generator.polls = (Gone("404"), DONE), 0
-    with counted() as bill:
+    generator.states, generator.polls = (NotFound("404"), DONE), 0
+    with record_charges() as bill:
         _run(generator, tmp_path, jobs)
     # the first job's cost again: nobody can know that its result was stored, and the one that is counts all of it
     assert generator.asked == [5, 5] and bill.usd == 0.5
-    generator.states = (Gone("404"),)
-    with pytest.raises(Gone):
+    generator.states = (NotFound("404"),)
+    with pytest.raises(NotFound):
         _run(generator, tmp_path, jobs)
     assert generator.asked == [5, 5, 5]
 
@@ -162,8 +162,8 @@ class Broken(Scripted):
 
 
 def test_unanswered_submit_is_never_repeated_unless_allowed(tmp_path: Path) -> None:
-    jobs, generator = Dictionary(), Broken(Unanswered("timed out"))
-    with counted() as bill, pytest.raises(Unanswered):
+    jobs, generator = Dictionary(), Broken(AnswerLost("timed out"))
+    with record_charges() as bill, pytest.raises(AnswerLost):
         _run(generator, tmp_path, jobs)
     assert bill.usd == 0.25  # it may have been paid for
     generator.error = None
@@ -175,8 +175,8 @@ def test_unanswered_submit_is_never_repeated_unless_allowed(tmp_path: Path) -> N
 
 
 def test_unanswered_submit_of_a_free_service_is_repeated(tmp_path: Path) -> None:
-    jobs, generator = Dictionary(), Broken(Unanswered("timed out"), usd=0.0)
-    with pytest.raises(Unanswered):
+    jobs, generator = Dictionary(), Broken(AnswerLost("timed out"), usd=0.0)
+    with pytest.raises(AnswerLost):
         _run(generator, tmp_path, jobs)
     generator.error = None
     assert _run(generator, tmp_path, jobs).path.is_file()
@@ -185,7 +185,7 @@ def test_unanswered_submit_of_a_free_service_is_repeated(tmp_path: Path) -> None
 @pytest.mark.parametrize("error", [AccessDenied("no"), Unavailable("HTTP 500"), Rejected("generator_failed", "unsafe")])
 def test_refused_submit_is_neither_charged_nor_remembered(tmp_path: Path, error: Exception) -> None:
     jobs = Dictionary()
-    with counted() as bill, pytest.raises(type(error)):
+    with record_charges() as bill, pytest.raises(type(error)):
         _run(Broken(error), tmp_path, jobs)
     assert bill.usd == 0 and not jobs.notes
 
@@ -205,7 +205,7 @@ def test_jobs_that_end_with_the_process_are_not_remembered(tmp_path: Path) -> No
 
 
 def test_nothing_is_needed_of_a_memory_that_keeps_nothing(tmp_path: Path) -> None:
-    assert _run(Scripted(), tmp_path, NoMemory()).path.is_file()
+    assert _run(Scripted(), tmp_path, NullJobMemory()).path.is_file()
 
 
 def test_digest_tells_requests_apart() -> None:
@@ -231,9 +231,9 @@ def test_digest_tells_requests_apart() -> None:
 
 def test_an_attempt_that_waits_is_counted_once(tmp_path: Path) -> None:
     jobs, generator = Dictionary(), Scripted(JobState("running"))
-    with counted() as first, pytest.raises(Unavailable):
+    with record_charges() as first, pytest.raises(Unavailable):
         _run(generator, tmp_path, jobs)
     generator.states = (DONE,)
-    with counted() as second:
+    with record_charges() as second:
         _run(generator, tmp_path, jobs)
     assert (first.usd, second.usd) == (0.25, 0.0) and generator.asked == [5]

@@ -10,8 +10,8 @@ import pytest
 
 from manitwin.errors import Rejected
 from manitwin.models.generators.lift.lifting import ShapeHint, lift
-from manitwin.models.generators.lift.made_photo import from_photo
-from manitwin.models.generators.lift.seen_corners import box_from_corner, box_sides, six_corners
+from manitwin.models.generators.lift.photo_generation import generate_from_photo
+from manitwin.models.generators.lift.seen_corners import box_sides, fit_corner_box, six_corners
 from manitwin.models.generators.templates.fitting.view import View, normalised
 
 SIDE_PX = 640
@@ -65,11 +65,11 @@ def test_a_nameless_box_from_near_is_a_box_of_these_sides_and_is_not_called_one(
     sides: tuple[float, float, float],
 ) -> None:
     rgba = _drawn(sides, View(0.7, 0.55, 0.0, 0.2))
-    found = box_from_corner(rgba)
+    found = fit_corner_box(rgba)
     assert found is not None
     measured = np.sort(np.ptp(found.made.mesh.vertices, axis=0))
     assert measured / measured[-1] == pytest.approx(np.sort(sides) / max(sides), rel=0.06)
-    job = from_photo(rgba, None)
+    job = generate_from_photo(rgba, None)
     assert job.notes["primitive"] == "box" and job.notes["source"] == "the outline's six corners"
     assert job.known is None and not job.metric
 
@@ -77,7 +77,7 @@ def test_a_nameless_box_from_near_is_a_box_of_these_sides_and_is_not_called_one(
 def test_a_box_of_which_one_face_is_seen_is_not_known_by_its_corners() -> None:
     rgba = _drawn((0.2, 0.1, 0.15), View(0.0, 0.0, 0.0, 0.02))
     assert six_corners(rgba[..., 3] > 127) is None
-    assert box_from_corner(rgba) is None
+    assert fit_corner_box(rgba) is None
 
 
 def test_a_nut_from_above_is_no_box() -> None:
@@ -86,7 +86,7 @@ def test_a_nut_from_above_is_no_box() -> None:
     rgba = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
     cv2.fillConvexPoly(rgba, corners, (120, 120, 120, 255))
     cv2.circle(rgba, (320, 320), 90, (0, 0, 0, 0), -1)
-    assert box_from_corner(rgba) is None
+    assert fit_corner_box(rgba) is None
 
 
 def test_corners_of_which_opposite_edges_do_not_agree_are_of_no_box() -> None:
@@ -115,7 +115,7 @@ def test_a_circle_and_an_ellipse_that_is_said_to_be_round_are_solids_of_revoluti
 @pytest.mark.slow
 def test_a_long_speaker_is_a_box_that_lies_and_no_speaker_on_its_end() -> None:
     view = View(np.radians(40), np.radians(35), np.radians(12), 0.2)
-    made = from_photo(_drawn((0.2, 0.055, 0.07), view), "speaker")
+    made = generate_from_photo(_drawn((0.2, 0.055, 0.07), view), "speaker")
     assert made.notes["primitive"] == "box" and made.known is None
     measures = made.notes["measures"]
     sides = np.array([measures["width"], measures["depth"], 1.0]) * measures["height_m"]

@@ -6,7 +6,7 @@ import pytest
 
 from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.lift.lifting import lift
-from manitwin.models.generators.lift.soles import with_soles
+from manitwin.models.generators.lift.soles import extend_feet
 from manitwin.models.generators.lift.surface import tip_angle_deg
 
 STANDS = ShapeHint(stands=True)
@@ -48,7 +48,7 @@ def test_the_overlap_is_that_of_what_stands() -> None:
 def test_feet_go_down_to_the_lowest_row_and_what_ends_higher_does_not() -> None:
     mask = _figure(back_foot_px=20)[..., 3] > 127
     height = int(np.ptp(np.nonzero(mask.any(axis=1))[0])) + 1
-    footed, near = with_soles(mask, 0.09), with_soles(mask, 0.0)
+    footed, near = extend_feet(mask, 0.09), extend_feet(mask, 0.0)
     assert 0.09 * height > 20
     assert footed[399, 195:236].all()
     assert not near[399, 195:236].any()

@@ -16,7 +16,7 @@ from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.fakes.tripo import FakeTripo
 from manitwin.models.generators.tripo import URL, TripoGenerator
-from manitwin.models.services.refusal import Gone, NotTaken
+from manitwin.models.services.refusal import NotFound, RequestRejected
 
 
 @pytest.fixture(autouse=True)
@@ -77,7 +77,7 @@ def test_option_that_the_vendor_refuses_is_named(tmp_path: Path) -> None:
     fake, settings = FakeTripo(key=KEY), config(options={"texture_quality": "superb"})
     with FakeServer(fake) as server:
         ran = run(TripoGenerator.from_spec(f"@{server.url}", settings), tmp_path, settings)
-    assert type(ran.error) is NotTaken and "error 1004" in str(ran.error) and "superb" in str(ran.error)
+    assert type(ran.error) is RequestRejected and "error 1004" in str(ran.error) and "superb" in str(ran.error)
     assert not fake.tasks and ran.usd == 0
 
 
@@ -116,7 +116,7 @@ def test_states_of_a_task(data: dict[str, Any], state: str, words: str) -> None:
 
 
 def test_expired_task_is_gone() -> None:
-    with FakeServer(Fixed(200, {"code": 0, "data": {"status": "expired"}})) as server, pytest.raises(Gone):
+    with FakeServer(Fixed(200, {"code": 0, "data": {"status": "expired"}})) as server, pytest.raises(NotFound):
         TripoGenerator.from_spec(f"@{server.url}", config()).poll("task")
 
 
@@ -144,9 +144,9 @@ CODES = [
     (403, 2010, AccessDenied),
     (403, 1005, AccessDenied),
     (401, 1002, AccessDenied),
-    (404, 2001, Gone),
-    (200, 2001, Gone),
-    (400, 2017, NotTaken),
+    (404, 2001, NotFound),
+    (200, 2001, NotFound),
+    (400, 2017, RequestRejected),
     (429, 2000, RateLimited),
 ]
 

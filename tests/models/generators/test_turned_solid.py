@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from kept_solids import kept_solids
-from manitwin.models.generators.lift import made_photo, nameless
-from manitwin.models.generators.lift.made_photo import from_photo
-from manitwin.models.generators.lift.nameless import OF_LIKELY_NAMES, OF_TURNED_SOLIDS
+from manitwin.models.generators.lift import photo_generation, unnamed_shape
+from manitwin.models.generators.lift.photo_generation import generate_from_photo
 from manitwin.models.generators.lift.plain_solids import PlainSolids
 from manitwin.models.generators.lift.turned_solid import turned_solid
-from manitwin.models.generators.templates.fitting.fit import Fitted, fit
+from manitwin.models.generators.lift.unnamed_shape import REVOLUTION_SOURCE, TEMPLATE_SOURCE
+from manitwin.models.generators.templates.fitting.fit import TemplateFit, fit
 from manitwin.models.generators.templates.fitting.view import View, normalised
 
 SIDE_PX = 640
@@ -50,7 +50,7 @@ def _seen(profile: tuple[tuple[float, float], ...], elevation_deg: float) -> np.
 
 @pytest.mark.parametrize("elevation_deg", [40.0, 55.0])
 def test_what_is_seen_from_above_is_as_high_as_it_is(elevation_deg: float) -> None:
-    found = nameless.turned_solid(_seen(BOTTLE, elevation_deg))
+    found = unnamed_shape.turned_solid(_seen(BOTTLE, elevation_deg))
     assert found is not None and found.upright
     assert np.degrees(found.view.elevation_rad) == pytest.approx(elevation_deg, abs=7.0)
     width, depth, height = np.ptp(found.made.mesh.vertices, axis=0)
@@ -60,44 +60,44 @@ def test_what_is_seen_from_above_is_as_high_as_it_is(elevation_deg: float) -> No
 
 
 def test_a_nameless_bottle_seen_from_above_is_that_body_and_stands(monkeypatch: pytest.MonkeyPatch) -> None:
-    job = from_photo(_seen(BOTTLE, 55.0), None)
-    assert job.notes["primitive"] == "revolution" and job.notes["source"] == OF_TURNED_SOLIDS
+    job = generate_from_photo(_seen(BOTTLE, 55.0), None)
+    assert job.notes["primitive"] == "revolution" and job.notes["source"] == REVOLUTION_SOURCE
     assert job.notes["rests"] == "standing" and job.known is None and not job.metric
-    monkeypatch.setattr(nameless, "turned_solid", turned_solid)  # fitted again, and not kept
-    assert from_photo(_seen(BOTTLE, 55.0), None).glb == job.glb
+    monkeypatch.setattr(unnamed_shape, "turned_solid", turned_solid)  # fitted again, and not kept
+    assert generate_from_photo(_seen(BOTTLE, 55.0), None).glb == job.glb
 
 
 def test_a_can_is_no_open_one_because_that_is_what_it_may_be_called() -> None:
-    job = from_photo(_seen(CAN, 30.0), None, likely=[("trash can", 0.4)])
-    assert job.notes["primitive"] == "revolution" and job.notes["source"] == OF_TURNED_SOLIDS
+    job = generate_from_photo(_seen(CAN, 30.0), None, likely=[("trash can", 0.4)])
+    assert job.notes["primitive"] == "revolution" and job.notes["source"] == REVOLUTION_SOURCE
 
 
 @pytest.fixture(scope="module")
-def can() -> tuple[np.ndarray, Fitted, Fitted]:
+def can() -> tuple[np.ndarray, TemplateFit, TemplateFit]:
     """A picture, the body of revolution fitted to it, and a can that was."""
     rgba = _seen(CAN, 30.0)
-    turned, other = nameless.turned_solid(rgba), fit("can", rgba)
+    turned, other = unnamed_shape.turned_solid(rgba), fit("can", rgba)
     assert turned is not None and other is not None
     return rgba, turned, other
 
 
-@pytest.mark.parametrize(("dearer", "source"), [(0.005, OF_LIKELY_NAMES), (0.02, OF_TURNED_SOLIDS)])
+@pytest.mark.parametrize(("dearer", "source"), [(0.005, TEMPLATE_SOURCE), (0.02, REVOLUTION_SOURCE)])
 def test_a_likely_name_speaks_where_both_explain_a_photo_as_well(
-    dearer: float, source: str, can: tuple[np.ndarray, Fitted, Fitted], monkeypatch: pytest.MonkeyPatch
+    dearer: float, source: str, can: tuple[np.ndarray, TemplateFit, TemplateFit], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rgba, turned, other = can
     left = dataclasses.replace(turned.residual, iou=turned.residual.iou - dearer)
-    monkeypatch.setattr(nameless, "fit", lambda *arguments, **options: dataclasses.replace(other, residual=left))
-    monkeypatch.setattr(made_photo, "plain_solids", lambda *arguments: PlainSolids())
-    assert from_photo(rgba, None, likely=[("can", 0.3)]).notes["source"] == source
+    monkeypatch.setattr(unnamed_shape, "fit", lambda *arguments, **options: dataclasses.replace(other, residual=left))
+    monkeypatch.setattr(photo_generation, "plain_solids", lambda *arguments: PlainSolids())
+    assert generate_from_photo(rgba, None, likely=[("can", 0.3)]).notes["source"] == source
 
 
 @pytest.mark.parametrize(("dearer", "primitive"), [(-0.01, "cylinder"), (0.01, "revolution")])
 def test_a_plain_cylinder_stands_where_no_other_body_of_revolution_explains_the_photo_better(
-    dearer: float, primitive: str, can: tuple[np.ndarray, Fitted, Fitted], monkeypatch: pytest.MonkeyPatch
+    dearer: float, primitive: str, can: tuple[np.ndarray, TemplateFit, TemplateFit], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rgba, turned, other = can
     left = dataclasses.replace(turned.residual, shading=turned.residual.shading + dearer / 0.15)
     near = dataclasses.replace(other, residual=left)
-    monkeypatch.setattr(made_photo, "plain_solids", lambda *arguments: PlainSolids(near, near))
-    assert from_photo(rgba, None).notes["primitive"] == primitive
+    monkeypatch.setattr(photo_generation, "plain_solids", lambda *arguments: PlainSolids(near, near))
+    assert generate_from_photo(rgba, None).notes["primitive"] == primitive

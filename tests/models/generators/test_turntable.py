@@ -6,13 +6,18 @@ import numpy as np
 import pytest
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift.carved_part import MOST_COLOURING, carved_part, colouring
+from manitwin.models.generators.lift.carved_part import MOST_COLOUR_PHOTOS, carved_part, select_colour_photos
 from manitwin.models.generators.lift.carving import carve
-from manitwin.models.generators.lift.made_of_views import MadeOfViews
-from manitwin.models.generators.lift.pinhole import passing_px
-from manitwin.models.generators.lift.several import from_views
+from manitwin.models.generators.lift.multi_view_generation import generate_from_views
+from manitwin.models.generators.lift.multi_view_result import MultiViewResult
+from manitwin.models.generators.lift.pinhole import mean_ray_miss_px
 from manitwin.models.generators.lift.surface import to_manifold
-from manitwin.models.generators.lift.turntable import TurntableCamera, calibrated, scaled_masks, sights_of
+from manitwin.models.generators.lift.turntable import (
+    TurntableCamera,
+    calibrate_turntable,
+    pinhole_silhouettes,
+    scaled_masks,
+)
 from manitwin.models.generators.protocol import PhotoView
 from turned_things import FOV_DEG, SIDES, turned_photo, turned_thing
 
@@ -25,7 +30,7 @@ def _turned(count: int, elevation_deg: float) -> tuple[list[tuple[str, np.ndarra
 @pytest.mark.parametrize("elevation_deg", [pytest.param(0.0, marks=pytest.mark.slow), 30.0])
 def test_a_camera_that_stays_is_told_by_the_outlines(elevation_deg: float) -> None:
     turns = [60.0 * k for k in range(6)]
-    camera = calibrated([turned_photo(turn, elevation_deg, aside_m=0.02) for turn in turns], turns)
+    camera = calibrate_turntable([turned_photo(turn, elevation_deg, aside_m=0.02) for turn in turns], turns)
     focal = 0.75 * 0.5 / np.tan(np.deg2rad(FOV_DEG / 2))
     assert camera.elevation_deg == pytest.approx(elevation_deg, abs=3)
     assert camera.focal == pytest.approx(focal, rel=0.2)
@@ -35,10 +40,12 @@ def test_a_camera_that_stays_is_told_by_the_outlines(elevation_deg: float) -> No
 def test_an_outline_that_another_camera_saw_is_the_same_as_one_that_is_made_for_it() -> None:
     turns = [0.0, 70.0, 140.0]
     masks = scaled_masks([turned_photo(turn, 20.0) for turn in turns], 160)
-    first, second = (sights_of(masks, TurntableCamera(elevation, 1.0, 0.5, 0.0), turns) for elevation in (10.0, 20.0))
-    passing_px(first)  # finds what is kept of the outlines
-    moved = [sight.seen_from(other.matrix, other.focal_px) for sight, other in zip(first, second, strict=True)]
-    assert passing_px(moved) == passing_px(second) != passing_px(first)
+    first, second = (
+        pinhole_silhouettes(masks, TurntableCamera(elevation, 1.0, 0.5, 0.0), turns) for elevation in (10.0, 20.0)
+    )
+    mean_ray_miss_px(first)  # finds what is kept of the outlines
+    moved = [sight.with_camera(other.matrix, other.focal_px) for sight, other in zip(first, second, strict=True)]
+    assert mean_ray_miss_px(moved) == mean_ray_miss_px(second) != mean_ray_miss_px(first)
     assert all(one.rim_rays is other.rim_rays for one, other in zip(first, moved, strict=True))
 
 
@@ -50,7 +57,7 @@ def test_eight_photos_from_above_make_the_thing_and_not_what_lies_below_it() -> 
     height = float(np.ptp(carved.surface.vertices[:, 1]))
     assert np.ptp(carved.surface.vertices, axis=0) * size[2] / height == pytest.approx(size[[0, 2, 1]], abs=0.004)
     assert to_manifold(carved.surface).volume() * (size[2] / height) ** 3 == pytest.approx(true.volume, rel=0.2)
-    assert min(carved.covered) > 0.97 and carved.camera is not None
+    assert min(carved.covered_shares) > 0.97 and carved.camera is not None
 
 
 @pytest.mark.slow
@@ -89,7 +96,9 @@ def test_a_photo_at_a_wrong_turn_is_named() -> None:
 def test_of_many_the_one_that_does_not_go_with_the_others_is_left_out_and_told() -> None:
     photos, turns = _turned(6, 25.0)
     photos[3] = ("wrong.png", turned_photo(turns[3] + 70, 25.0))
-    made = from_views([PhotoView(name, rgba, turn) for (name, rgba), turn in zip(photos, turns, strict=True)], None)
+    made = generate_from_views(
+        [PhotoView(name, rgba, turn) for (name, rgba), turn in zip(photos, turns, strict=True)], None
+    )
     assert made.notes["left_out"] == ["wrong.png"]
     assert [view["turn_deg"] for view in made.notes["views"]] == [*turns[:3], *turns[4:]]
     assert made.notes["camera"]["elevation_deg"] == pytest.approx(25, abs=3)
@@ -115,13 +124,15 @@ def test_a_photo_that_was_scaled_is_used_and_one_that_was_cropped_is_named() -> 
 
 
 @pytest.fixture(scope="module")
-def made() -> MadeOfViews:
+def made() -> MultiViewResult:
     """What six photos from above, at stated turns, make."""
     photos, turns = _turned(6, 25.0)
-    return from_views([PhotoView(name, rgba, turn) for (name, rgba), turn in zip(photos, turns, strict=True)], None)
+    return generate_from_views(
+        [PhotoView(name, rgba, turn) for (name, rgba), turn in zip(photos, turns, strict=True)], None
+    )
 
 
-def test_each_side_has_its_colour_from_above(made: MadeOfViews) -> None:
+def test_each_side_has_its_colour_from_above(made: MultiViewResult) -> None:
     part = made.part
     texture = np.asarray(part.visual.material.baseColorTexture.convert("RGB"))
     for normal, colour in (((1, 0, 0), SIDES[0]), ((0, -1, 0), SIDES[4]), ((0, 1, 0), SIDES[1]), ((0, 0, 1), SIDES[2])):
@@ -135,12 +146,12 @@ def test_each_side_has_its_colour_from_above(made: MadeOfViews) -> None:
 @pytest.mark.slow
 def test_the_texture_of_many_photos_is_about_square_and_of_some_that_are_spread() -> None:
     carved = carve(*_turned(13, 25.0))
-    chosen = colouring(carved)
-    assert len(chosen) == MOST_COLOURING and {photo.name for photo in chosen} > {"0.png"}
+    chosen = select_colour_photos(carved)
+    assert len(chosen) == MOST_COLOUR_PHOTOS and {photo.name for photo in chosen} > {"0.png"}
     width, height = carved_part(carved).visual.material.baseColorTexture.size
     assert max(width, height) < 1.6 * min(width, height)
 
 
-def test_what_the_camera_was_told_to_be_is_kept_in_the_notes(made: MadeOfViews) -> None:
+def test_what_the_camera_was_told_to_be_is_kept_in_the_notes(made: MultiViewResult) -> None:
     assert made.notes["camera"]["elevation_deg"] == pytest.approx(25, abs=3)
     assert [view["colours"] for view in made.notes["views"]] == [True] * 6

@@ -8,12 +8,12 @@ import pytest
 
 from manitwin.errors import Rejected
 from manitwin.geometry.solids.shapes import box, cylinder
-from manitwin.models.generators.lift.made_photo import fitted_or_lifted, from_photo
+from manitwin.models.generators.lift.photo_generation import fit_or_lift, generate_from_photo
 from manitwin.models.generators.lift.usual_shape import (
     LEAST_TURNED_SHARE,
-    turned_share,
-    why_never_turned,
-    why_other_proportions,
+    proportion_conflict,
+    revolution_conflict,
+    revolution_share,
 )
 
 
@@ -34,10 +34,10 @@ STUB = outline([(270, 120), (270, 480)])
 
 
 def test_a_square_bar_is_not_round_and_a_hexagonal_one_nearly() -> None:
-    assert turned_share(cylinder(0.02, 0.1)) > 0.95
-    assert turned_share(cylinder(0.02, 0.1) - cylinder(0.018, 0.2)) > 0.95  # a hollow counts as filled
-    assert turned_share(cylinder(0.02, 0.1, sides=6)) > LEAST_TURNED_SHARE
-    assert turned_share(box(0.04, 0.04, 0.1)) < LEAST_TURNED_SHARE - 0.04
+    assert revolution_share(cylinder(0.02, 0.1)) > 0.95
+    assert revolution_share(cylinder(0.02, 0.1) - cylinder(0.018, 0.2)) > 0.95  # a hollow counts as filled
+    assert revolution_share(cylinder(0.02, 0.1, sides=6)) > LEAST_TURNED_SHARE
+    assert revolution_share(box(0.04, 0.04, 0.1)) < LEAST_TURNED_SHARE - 0.04
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_a_square_bar_is_not_round_and_a_hexagonal_one_nearly() -> None:
     ["shoe", "sneaker", "hairbrush", "toothpaste", "nail clipper", "headphones", "toy car", "glue gun", "backpack"],
 )
 def test_what_is_not_round_by_its_template_or_its_prior_is_no_body_of_revolution(name: str) -> None:
-    why = why_never_turned(name)
+    why = revolution_conflict(name)
     assert why is not None and "is not round" in why
 
 
@@ -66,7 +66,7 @@ def test_what_is_not_round_by_its_template_or_its_prior_is_no_body_of_revolution
     ],
 )
 def test_what_is_round_but_for_its_handle_and_what_nobody_knows_may_be_one(name: str | None) -> None:
-    assert why_never_turned(name) is None
+    assert revolution_conflict(name) is None
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_what_is_round_but_for_its_handle_and_what_nobody_knows_may_be_one(name:
     ],
 )
 def test_proportions_that_no_such_thing_has_are_told(name: str, extents: tuple[float, ...], side: str) -> None:
-    why = why_other_proportions(name, np.array(extents))
+    why = proportion_conflict(name, np.array(extents))
     assert why is not None and f"times as long as {side}" in why
 
 
@@ -97,24 +97,24 @@ def test_proportions_that_no_such_thing_has_are_told(name: str, extents: tuple[f
 def test_proportions_within_twice_the_usual_and_of_what_is_not_known_are_not(
     name: str | None, extents: tuple[float, ...]
 ) -> None:
-    assert why_other_proportions(name, np.array(extents)) is None
+    assert proportion_conflict(name, np.array(extents)) is None
 
 
 def test_a_shoe_seen_from_its_toe_is_refused_and_a_vase_of_that_outline_made() -> None:
     with pytest.raises(Rejected, match=r"a shoe is not round; take the photo from another side.*several photos"):
-        fitted_or_lifted(None, TOE, "shoe")
-    assert fitted_or_lifted(None, TOE, "vase").notes["primitive"] == "revolution"
+        fit_or_lift(None, TOE, "shoe")
+    assert fit_or_lift(None, TOE, "vase").notes["primitive"] == "revolution"
 
 
 def test_a_pencil_seen_nearly_from_its_end_is_refused_and_a_candle_of_that_outline_made() -> None:
     with pytest.raises(Rejected, match=r"a pencil is so .* times"):
-        fitted_or_lifted(None, STUB, "pencil")
-    assert fitted_or_lifted(None, STUB, "candle").notes["primitive"] == "revolution"
+        fit_or_lift(None, STUB, "pencil")
+    assert fit_or_lift(None, STUB, "candle").notes["primitive"] == "revolution"
 
 
 def test_what_lies_flat_may_be_thinner_than_the_template_where_little_of_it_is_missing() -> None:
-    assert why_other_proportions("spatula", np.array([0.3, 0.08, 0.0045])) is None  # 0.02 of its length
-    assert "thick" in (why_other_proportions("door knob", np.array([0.06, 0.06, 0.008])) or "")
+    assert proportion_conflict("spatula", np.array([0.3, 0.08, 0.0045])) is None  # 0.02 of its length
+    assert "thick" in (proportion_conflict("door knob", np.array([0.06, 0.06, 0.008])) or "")
 
 
 def test_an_outline_that_the_template_of_the_name_covers_badly_is_not_lifted_under_that_name() -> None:
@@ -126,7 +126,7 @@ def test_an_outline_that_the_template_of_the_name_covers_badly_is_not_lifted_und
         cv2.circle(mask, middle, radius, 1, -1)
     rgba = np.dstack([np.full((240, 320, 3), (60, 110, 160), np.uint8), 255 * mask])
     with pytest.raises(Rejected, match=r"no dumbbell that the template makes has this outline .* overlap 0\.\d\d"):
-        from_photo(rgba, "dumbbell")
-    assert from_photo(rgba, "gizmo").notes["primitive"] == "inflation", (
+        generate_from_photo(rgba, "dumbbell")
+    assert generate_from_photo(rgba, "gizmo").notes["primitive"] == "inflation", (
         "of a name without a template the outline is all"
     )

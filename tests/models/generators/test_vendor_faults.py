@@ -11,7 +11,7 @@ import pytest
 from generator_runs import KEY, USD, Fuse, FusedGenerator, Ran, config, run, text_request
 from manitwin.errors import AccessDenied, BadReply, RateLimited, Rejected, Unavailable
 from manitwin.models.fakes.faults import ALWAYS, Faults
-from manitwin.models.services.refusal import Unanswered
+from manitwin.models.services.refusal import AnswerLost
 from served_vendors import VENDORS, Vendor, serving, set_keys
 
 
@@ -117,7 +117,7 @@ def test_submit_whose_answer_is_lost_is_not_repeated(name: str, tmp_path: Path, 
         # a text needs no upload: the first request is the submit
         vendor.fake.faults = Faults({fault: 1})
         ran = run(vendor.generator(settings), tmp_path, settings, request=text_request())
-        assert type(ran.error) is Unanswered and isinstance(ran.error, Unavailable) and ran.usd == USD
+        assert type(ran.error) is AnswerLost and isinstance(ran.error, Unavailable) and ran.usd == USD
         assert len(vendor.fake.tasks) == vendor.submits == 1
         again = run(vendor.generator(settings), tmp_path, settings, request=text_request())
         assert type(again.error) is BadReply and "services.submit_again" in str(again.error) and again.usd == 0

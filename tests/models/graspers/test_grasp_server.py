@@ -16,7 +16,7 @@ import pytest
 import zmq
 
 from manitwin.config import ServicesConfig
-from manitwin.engine.charges import counted
+from manitwin.engine.charges import record_charges
 from manitwin.errors import BadReply, ConfigError, Unavailable
 from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.grasp_servers import FakeGraspGen
@@ -142,10 +142,10 @@ def test_what_is_no_address_is_a_configuration_error(argument: str) -> None:
 
 
 def test_a_rehearsal_says_that_it_is_one_and_a_server_does_not() -> None:
-    with FakeGraspGen() as server, counted() as rehearsal:
+    with FakeGraspGen() as server, record_charges() as rehearsal:
         answer = server_at(server.url).ask({"action": "metadata"})
     assert rehearsal.rehearsed and not [name for name in answer if "rehearsal" in str(name)]
-    with says(msgpack.packb({"gripper_name": "x"})) as (url, _), counted() as real:
+    with says(msgpack.packb({"gripper_name": "x"})) as (url, _), record_charges() as real:
         server_at(url).ask({"action": "metadata"})
     assert not real.rehearsed
 

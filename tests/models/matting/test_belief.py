@@ -15,7 +15,7 @@ from manitwin.models.matting.belief import (
     SCORES,
     WEIGHTS_FILE,
     WHOLE,
-    doubts_of,
+    log_odds_costs,
     probability,
 )
 from manitwin.models.matting.study import study_photo
@@ -34,8 +34,8 @@ def test_less_of_a_feature_never_makes_a_mask_likelier(name: str) -> None:
     assert probability(worse) <= probability(BEST)
     fitted = json.loads((files("manitwin.models.matting") / WEIGHTS_FILE).read_text(encoding="utf-8"))
     besides = {"kept": -np.log(0.5), "solid": 0.5}.get(name, 0.0)
-    assert doubts_of(worse)[name] == pytest.approx(0.5 * fitted["weights"][name] + besides)
-    assert sum(doubts_of(worse).values()) == pytest.approx(doubts_of(worse)[name])
+    assert log_odds_costs(worse)[name] == pytest.approx(0.5 * fitted["weights"][name] + besides)
+    assert sum(log_odds_costs(worse).values()) == pytest.approx(log_odds_costs(worse)[name])
 
 
 def test_what_is_certain_is_likelier_than_what_is_not() -> None:
@@ -67,4 +67,4 @@ def test_the_likelier_of_the_masks_comes_first() -> None:
 def test_pieces_are_told_from_ground_though_they_are_no_one_thing() -> None:
     photo, _ = _photo(((110, 150), (30, 90, 160)), ((300, 150), (160, 40, 40)))
     best = study_photo(photo).judged[0]
-    assert best.candidate.scores.whole < 1 and best.of_pieces > max(best.confidence, 0.8)
+    assert best.candidate.scores.whole < 1 and best.pieces_confidence > max(best.confidence, 0.8)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from manitwin.models.matting.candidates import Candidate, candidates, lost_parts, misjudged
+from manitwin.models.matting.candidates import Candidate, candidates, disputed_share, lost_parts
 from manitwin.models.matting.segmentation import Segmentation, segment
 
 SIZE = (300, 400)
@@ -60,15 +60,15 @@ def test_one_network_is_one_candidate_and_a_second_has_its_own_name() -> None:
 def test_a_filled_hole_in_focus_is_counted_by_its_area() -> None:
     both = made(filled())
     hole = int((filled() & ~ring_found()[1]).sum())
-    area = misjudged(both["network"], [both["rules"]], said(filled())) * filled().sum()
+    area = disputed_share(both["network"], [both["rules"]], said(filled())) * filled().sum()
     assert area == pytest.approx(hole, rel=0.1)
 
 
 def test_a_lost_part_is_counted_and_agreement_is_not() -> None:
     truth = ring_found()[1]
     agreeing, cut = made(truth), made(half())
-    assert misjudged(agreeing["network"], [agreeing["rules"]], said(truth)) < 0.01
-    assert misjudged(cut["network"], [cut["rules"]], said(half())) == pytest.approx(1.0, abs=0.25), (
+    assert disputed_share(agreeing["network"], [agreeing["rules"]], said(truth)) < 0.01
+    assert disputed_share(cut["network"], [cut["rules"]], said(half())) == pytest.approx(1.0, abs=0.25), (
         "as much again as it has"
     )
 
@@ -77,9 +77,9 @@ def test_what_a_third_sees_alone_is_outvoted_where_rules_and_a_network_agree() -
     truth = ring_found()[1]
     three = made(filled(), truth)
     others = [three["rules"], three["network"]]
-    assert misjudged(three["built_in_network"], others, said(truth)) < 0.01
-    assert misjudged(three["rules"], [three["network"], three["built_in_network"]], said(truth)) < 0.01
-    assert misjudged(three["network"], [three["rules"], three["built_in_network"]], said(truth)) > 0.05, (
+    assert disputed_share(three["built_in_network"], others, said(truth)) < 0.01
+    assert disputed_share(three["rules"], [three["network"], three["built_in_network"]], said(truth)) < 0.01
+    assert disputed_share(three["network"], [three["rules"], three["built_in_network"]], said(truth)) > 0.05, (
         "two networks are not enough"
     )
 
@@ -89,7 +89,7 @@ def test_parts_that_rules_alone_found_are_joined_to_what_the_network_found() -> 
     joined = made(half())["both"]
     assert overlap(joined.found.mask, truth) > 0.97
     assert joined.by_network and not joined.independent
-    assert misjudged(joined, [made(half())["rules"]], said(half())) < 0.01
+    assert disputed_share(joined, [made(half())["rules"]], said(half())) < 0.01
 
 
 def test_a_piece_of_soft_outline_is_no_part() -> None:
@@ -119,12 +119,12 @@ def test_what_runs_out_of_the_picture_beside_the_thing_is_ground_and_no_lost_par
     rules, network = replace(found, mask=truth | joint, narrow=narrow), replace(found, mask=truth, narrow=narrow)
     one, other, unsure = made(truth)["network"], made(truth)["rules"], said(truth, 0.3)
     seen = replace(one, found=network)
-    assert misjudged(seen, [replace(other, found=rules)], unsure) == 0.0
+    assert disputed_share(seen, [replace(other, found=rules)], unsure) == 0.0
     assert not lost_parts(rules.mask, network, unsure).any()
     within = joint.copy()
     within[:, :30] = within[:, -30:] = False  # the same, wholly in the picture, may be a part
     inner = replace(rules, mask=truth | within)
-    assert misjudged(seen, [replace(other, found=inner)], unsure) > 0.05
+    assert disputed_share(seen, [replace(other, found=inner)], unsure) > 0.05
     assert (lost_parts(inner.mask, network, unsure) & within).sum() > 0.8 * within.sum()
 
 
@@ -137,7 +137,9 @@ def test_what_runs_out_of_the_picture_from_the_thing_is_still_a_doubt() -> None:
     one, other = made(truth)["network"], made(truth)["rules"]
     seen = replace(one, found=replace(found, mask=truth, narrow=narrow))
     assert (
-        misjudged(seen, [replace(other, found=replace(found, mask=truth | handle, narrow=narrow))], said(truth, 0.3))
+        disputed_share(
+            seen, [replace(other, found=replace(found, mask=truth | handle, narrow=narrow))], said(truth, 0.3)
+        )
         > 0.05
     )
 
@@ -150,14 +152,14 @@ def test_the_sharp_shadow_that_rules_take_for_a_part_is_none_where_the_network_i
     dark = replace(found, background=replace(found.background, lab=lab), narrow=narrow)
     rules, network = (replace(dark, mask=mask) for mask in (truth | shadow, truth))
     seen, other = (replace(made(truth)[maker], found=each) for maker, each in (("network", network), ("rules", rules)))
-    assert misjudged(seen, [other], said(truth)) == 0.0 and not lost_parts(rules.mask, network, said(truth)).any()
+    assert disputed_share(seen, [other], said(truth)) == 0.0 and not lost_parts(rules.mask, network, said(truth)).any()
     unsure = said(truth, 0.2)
-    assert misjudged(seen, [other], unsure) > 0.05 and lost_parts(rules.mask, network, unsure).any()
+    assert disputed_share(seen, [other], unsure) > 0.05 and lost_parts(rules.mask, network, unsure).any()
     another_colour = replace(found.colours, certain=found.colours.certain | shadow)
     for changed in (
         {"colours": another_colour},
         {"background": found.background},
     ):  # the latter: as light as the ground
         unlike = [replace(each, found=replace(each.found, **changed)) for each in (seen, other)]
-        assert misjudged(unlike[0], unlike[1:], said(truth)) > 0.05
+        assert disputed_share(unlike[0], unlike[1:], said(truth)) > 0.05
         assert lost_parts(rules.mask, unlike[0].found, said(truth)).any()

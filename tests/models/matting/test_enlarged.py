@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from manitwin.models.matting import matte_photo
-from manitwin.models.matting.enlarged import colours_along_light, enlarged
+from manitwin.models.matting.upsampling import enlarge_photo, sharpen_chroma
 
 GROUND, THING = (196, 192, 186), (120, 60, 58)
 
@@ -36,12 +36,12 @@ def _colour_error(rgb: np.ndarray, true: np.ndarray) -> float:
 
 def test_a_photo_of_working_size_is_left_as_it_is() -> None:
     rgb, _ = _scene(512)
-    assert enlarged(rgb, 512) is rgb
+    assert enlarge_photo(rgb, 512) is rgb
 
 
 @pytest.mark.parametrize("shape", [(256, 192), (100, 256), (511, 20)])
 def test_the_longer_side_of_a_small_photo_becomes_the_working_size(shape: tuple[int, int]) -> None:
-    seen = enlarged(np.full((*shape, 3), 90, np.uint8), 512)
+    seen = enlarge_photo(np.full((*shape, 3), 90, np.uint8), 512)
     assert max(seen.shape[:2]) == 512 and seen.shape[2] == 3
     assert seen.shape[0] / seen.shape[1] == pytest.approx(shape[0] / shape[1], rel=0.05)
     assert (seen == 90).all()
@@ -50,7 +50,7 @@ def test_the_longer_side_of_a_small_photo_becomes_the_working_size(shape: tuple[
 def test_colours_that_compression_smeared_return_to_the_edges_of_light() -> None:
     rgb, _ = _scene(256, noise=0.0)
     smeared = _compressed(rgb)
-    assert _colour_error(colours_along_light(smeared), rgb) < 0.75 * _colour_error(smeared, rgb)
+    assert _colour_error(sharpen_chroma(smeared), rgb) < 0.75 * _colour_error(smeared, rgb)
 
 
 def test_the_matte_of_a_small_compressed_photo_has_its_size_and_a_true_outline() -> None:

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from manitwin.models.matting import matte_photo, study
-from manitwin.models.matting.matte import DoubtedCutOut
-from manitwin.models.matting.trimmed import exact_ground
+from manitwin.models.matting.matte import DoubtfulMatte
+from manitwin.models.matting.trimmed import uniform_background_colour
 
 SIDE_PX = 400
 
@@ -32,7 +32,7 @@ def _blind(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_an_apple_is_cut_out_of_exact_white_though_the_network_sees_its_stem_alone() -> None:
     rgb, truth = _apple(noise=0)
-    assert exact_ground(rgb) is not None
+    assert uniform_background_colour(rgb) is not None
     matte = matte_photo(rgb, "apple.jpg")
     found = matte.rgba[..., 3] > 127
     assert (found & truth).sum() / (found | truth).sum() > 0.97
@@ -40,8 +40,8 @@ def test_an_apple_is_cut_out_of_exact_white_though_the_network_sees_its_stem_alo
 
 def test_on_a_photographed_ground_the_network_is_listened_to() -> None:
     rgb, _ = _apple(noise=6)
-    assert exact_ground(rgb) is None
-    with pytest.raises(DoubtedCutOut, match="do not agree"):
+    assert uniform_background_colour(rgb) is None
+    with pytest.raises(DoubtfulMatte, match="do not agree"):
         matte_photo(rgb, "apple.jpg")
 
 
@@ -51,10 +51,10 @@ def test_a_shadow_on_exact_white_is_no_part() -> None:
         cv2.ellipse(np.zeros((SIDE_PX, SIDE_PX)), (230, 330), (120, 18), 0, 0, 360, 0.3, -1), (0, 0), 9
     )
     shaded = np.where(truth[..., None], rgb, rgb * (1 - soft[..., None])).astype(np.uint8)
-    assert exact_ground(shaded) is not None
+    assert uniform_background_colour(shaded) is not None
     try:
         matte = matte_photo(shaded, "apple.jpg")
-    except DoubtedCutOut as doubted:
+    except DoubtfulMatte as doubted:
         matte = doubted.matte
     found = matte.rgba[..., 3] > 127
     assert (found & ~truth).sum() < 0.01 * truth.sum()

@@ -12,7 +12,7 @@ from manitwin.models.matting.outline_network import (
     AROUND_PX,
     NEAR_PX,
     VALUES,
-    BothSides,
+    OutlineColours,
     outline_model,
     patch_windows,
     patches,
@@ -129,7 +129,7 @@ def test_patches_have_the_pixels_around_where_they_are() -> None:
 def test_values_name_the_way_from_ground_to_thing() -> None:
     coverage = ring(14.0)
     photo = photographed(coverage, (0.7, 0.1, 0.05), plain(0.5))
-    sides = BothSides(photo, (coverage > 0.5).astype(np.float32), 2)
+    sides = OutlineColours(photo, (coverage > 0.5).astype(np.float32), 2)
     values, near = sides.values(0, len(photo)), sides.near
     along = values[..., 1] + 0.5
     assert near.any() and np.median(along[coverage > 0.99]) == pytest.approx(1, abs=0.05)
@@ -139,7 +139,7 @@ def test_values_name_the_way_from_ground_to_thing() -> None:
 def test_some_rows_at_a_time_are_those_of_the_whole() -> None:
     coverage = ring(14.0)
     photo = photographed(coverage, (0.7, 0.1, 0.05), plain(0.5))
-    sides = BothSides(photo, (coverage > 0.5).astype(np.float32), 3)
+    sides = OutlineColours(photo, (coverage > 0.5).astype(np.float32), 3)
     rows, columns = np.nonzero(sides.near[100:150])
     whole = patches(patch_windows(sides, 0, len(photo)), rows + 100, columns)
     assert np.array_equal(patches(patch_windows(sides, 100, 150), rows, columns), whole)
@@ -152,9 +152,9 @@ def test_colours_that_are_worked_out_some_rows_at_a_time_are_those_of_the_whole(
     photo = photographed(coverage, (0.7, 0.1, 0.05), plain(0.5))
     mask = (coverage > 0.5).astype(np.float32)
     monkeypatch.setattr(outline_network, "ROWS_AT_ONCE", len(photo))
-    whole = BothSides(photo, mask, 3).values(0, len(photo))
+    whole = OutlineColours(photo, mask, 3).values(0, len(photo))
     monkeypatch.setattr(outline_network, "ROWS_AT_ONCE", 7)
-    assert np.abs(BothSides(photo, mask, 3).values(0, len(photo)) - whole).max() < 1e-4
+    assert np.abs(OutlineColours(photo, mask, 3).values(0, len(photo)) - whole).max() < 1e-4
 
 
 def test_the_band_follows_the_photos_size() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from manitwin.errors import Rejected
 from manitwin.models.matting.background import model_background
-from manitwin.models.matting.ground_inside import ground_inside
+from manitwin.models.matting.enclosed_background import enclosed_background_share
 from manitwin.models.matting.matte import matte_photo
 from manitwin.models.matting.outline import edge_threshold, gradient_magnitude
 
@@ -33,7 +33,7 @@ def _share(slot: np.ndarray | None, network: np.ndarray | None = None) -> float:
     rgb, mask = _blade(slot)
     background = model_background(rgb)
     gradient = gradient_magnitude(background.lab)
-    return ground_inside(background, mask, gradient, edge_threshold(background, gradient), network)
+    return enclosed_background_share(background, mask, gradient, edge_threshold(background, gradient), network)
 
 
 @pytest.mark.parametrize("light", [1.0, 0.72])

@@ -92,7 +92,7 @@ def test_what_two_networks_see_alike_is_likelier(tmp_path: Path) -> None:
     assert not any(each.is_agreed for each in (*one, *differing))
     agreed = [each for each in two if each.is_agreed]
     assert {each.candidate.maker for each in agreed} >= {"network", "second_network"}
-    assert all(each.by_itself < each.confidence < 1 for each in agreed)
+    assert all(each.photo_confidence < each.confidence < 1 for each in agreed)
     asked = study_photo(photo, networks=find_networks(f"{alike},{other}"))
     assert set(asked.agreement) == {"rules", "colours", "network", "second_network", "built_in_network"}
     found = asked.alpha > 127

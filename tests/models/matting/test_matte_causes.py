@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from manitwin.models.matting.belief import BEST, FEATURES, doubts_of
+from manitwin.models.matting.belief import BEST, FEATURES, log_odds_costs
 from manitwin.models.matting.candidates import Candidate
-from manitwin.models.matting.causes import CAUSES, HOLES, cause_of, told
 from manitwin.models.matting.confidence import MatteScores, frame_cause, score
+from manitwin.models.matting.rejection_causes import CAUSES, HOLES, main_cause, told
 from manitwin.models.matting.segmentation import segment
 from manitwin.models.matting.study import study_photo
 
@@ -26,37 +26,37 @@ def _with(**values: float) -> np.ndarray:
 
 
 def test_the_score_that_costs_the_most_is_the_cause() -> None:
-    assert cause_of(_with(uncut=-3.0, network_beyond=-0.1), PERFECT) == "uncut"
+    assert main_cause(_with(uncut=-3.0, network_beyond=-0.1), PERFECT) == "uncut"
 
 
 def test_opinions_that_differ_are_explained_by_the_lowest_score() -> None:
     differing = _with(network_beyond=-4.0)
-    assert cause_of(differing, replace(PERFECT, sharply_bounded=0.1, crisp=0.3)) == "sharply_bounded"
-    assert cause_of(differing, replace(PERFECT, solid=0.2, crisp=0.3)) == "solid"
-    assert cause_of(_with(network_beyond=-4.0, network_alike=-4.0), replace(PERFECT, crisp=0.9)) == "stable"
+    assert main_cause(differing, replace(PERFECT, sharply_bounded=0.1, crisp=0.3)) == "sharply_bounded"
+    assert main_cause(differing, replace(PERFECT, solid=0.2, crisp=0.3)) == "solid"
+    assert main_cause(_with(network_beyond=-4.0, network_alike=-4.0), replace(PERFECT, crisp=0.9)) == "stable"
 
 
 def test_equally_low_scores_are_told_in_the_order_of_the_causes() -> None:
     differing = _with(network_beyond=-4.0)
     assert list(CAUSES).index("sharply_bounded") < list(CAUSES).index("outermost")
-    assert cause_of(differing, replace(PERFECT, outermost=0.0, sharply_bounded=0.0)) == "sharply_bounded"
+    assert main_cause(differing, replace(PERFECT, outermost=0.0, sharply_bounded=0.0)) == "sharply_bounded"
 
 
-@pytest.mark.parametrize("doubt", doubts_of(BEST))
+@pytest.mark.parametrize("doubt", log_odds_costs(BEST))
 def test_each_doubt_has_a_true_sentence(doubt: str) -> None:
     """Where opinions are alike but for a trifle, no cause says that they do not agree."""
-    cause = cause_of(_with(**{doubt: -0.9}), replace(PERFECT, stable=0.3))
+    cause = main_cause(_with(**{doubt: -0.9}), replace(PERFECT, stable=0.3))
     assert cause in CAUSES and cause != "stable"
 
 
 def test_a_thin_thing_is_called_thin() -> None:
-    assert cause_of(_with(bulk=-1.0, rival=-2.9, network_beyond=-0.4), PERFECT) == "bulk"
+    assert main_cause(_with(bulk=-1.0, rival=-2.9, network_beyond=-0.4), PERFECT) == "bulk"
 
 
 def test_what_one_opinion_says_is_told_where_they_mostly_agree() -> None:
-    assert cause_of(_with(network_beyond=-2.7, network_alike=-2.5), PERFECT) == "network_beyond"
-    assert cause_of(_with(network_within=-2.7, network_alike=-2.5), PERFECT) == "network_within"
-    assert cause_of(_with(network_within=-2.7, rival=-4.5), PERFECT) == "stable"
+    assert main_cause(_with(network_beyond=-2.7, network_alike=-2.5), PERFECT) == "network_beyond"
+    assert main_cause(_with(network_within=-2.7, network_alike=-2.5), PERFECT) == "network_within"
+    assert main_cause(_with(network_within=-2.7, rival=-4.5), PERFECT) == "stable"
 
 
 def _photo(

@@ -18,7 +18,7 @@ from manitwin.models.matting.object_network import (
     WAYS,
     WEIGHTS_FILES,
     decoder_weights,
-    in_two_looks,
+    evaluate_coarse_to_fine,
     network_bytes,
     object_share,
 )
@@ -131,18 +131,18 @@ def test_what_is_small_is_looked_at_again_closer() -> None:
 
     photo = np.zeros((200, 300, 3), np.uint8)
     photo[40:60, 100:130] = 200
-    share = in_two_looks(photo, look)
+    share = evaluate_coarse_to_fine(photo, look)
     assert len(sizes) == 2 and sizes[0] == (200, 300) and max(sizes[1]) < 70
     assert np.array_equal(share > 0.5, photo[..., 0] > 100)
     sizes.clear()
     photo[10:190, 10:290] = 200
-    in_two_looks(photo, look)
+    evaluate_coarse_to_fine(photo, look)
     assert sizes == [(200, 300)]
 
 
 def test_nothing_is_not_looked_at_again() -> None:
     empty = np.zeros((60, 80), np.float32)
-    assert in_two_looks(np.zeros((60, 80, 3), np.uint8), lambda rgb: empty) is empty
+    assert evaluate_coarse_to_fine(np.zeros((60, 80, 3), np.uint8), lambda rgb: empty) is empty
 
 
 def test_its_weights_are_small_enough_to_come_along() -> None:

@@ -7,7 +7,7 @@ import pytest
 from manitwin.errors import Rejected
 from manitwin.models.matting import matte_photo
 from manitwin.models.matting.matte import TRIMMED
-from manitwin.models.matting.trimmed import trimmed_margin, with_margin
+from manitwin.models.matting.trimmed import restore_margin, trimmed_margin
 
 WHITE = np.array([255, 255, 255])
 
@@ -47,7 +47,7 @@ def test_the_finding_is_that_of_trimmed_photos_alone() -> None:
 def test_what_the_frame_cuts_off_is_given_no_margin(side: tuple[slice, ...]) -> None:
     rgb = np.ascontiguousarray(_plum()[0][side])
     assert trimmed_margin(rgb) is None
-    assert with_margin(rgb)[0] is rgb
+    assert restore_margin(rgb)[0] is rgb
     with pytest.raises(Rejected):
         matte_photo(rgb, "part of a plum.jpg")
 
@@ -74,7 +74,7 @@ def test_what_ends_close_to_the_frame_without_touching_it_is_given_more_of_a_whi
 
 def test_the_margin_has_the_grounds_colour_and_the_photo_lies_in_its_middle() -> None:
     rgb, _ = _trimmed_to(*_plum())
-    wider, margin_px = with_margin(rgb)
+    wider, margin_px = restore_margin(rgb)
     assert margin_px == round(0.08 * max(rgb.shape[:2]))
     assert np.array_equal(wider[margin_px:-margin_px, margin_px:-margin_px], rgb)
     assert (wider[:margin_px] == WHITE).all() and (wider[:, -margin_px:] == WHITE).all()

@@ -16,7 +16,7 @@ from manitwin.config import BuildConfig, ServicesConfig
 from manitwin.errors import BadReply, ConfigError, Unavailable
 from manitwin.models.fakes.server import FakeServer, Response
 from manitwin.models.registry import create
-from manitwin.models.services.addresses import ForbiddenAddress, Reach, UnknownName, addresses_of, is_public
+from manitwin.models.services.addresses import AllowedServers, ForbiddenAddress, UnknownName, addresses_of, is_public
 from manitwin.models.services.connections import proxy_for
 from manitwin.models.services.http import HttpService, origin
 from manitwin.models.services.keys import redacted
@@ -43,14 +43,14 @@ def test_public_address(address: str) -> None:
 
 
 def test_every_address_of_a_name_has_to_be_public_but_for_the_configured_server() -> None:
-    reach = Reach("api.example", 443)
+    reach = AllowedServers("api.example", 443)
     assert reach.checked("cdn.example", 443, ["8.8.8.8", "2606:4700::1111"]) == ["8.8.8.8", "2606:4700::1111"]
     assert reach.checked("API.example", 443, ["10.0.0.7"]) == ["10.0.0.7"]
     for host, port in (("cdn.example", 443), ("api.example", 8443), ("api.example", 80), ("api.example.", 443)):
         with pytest.raises(ForbiddenAddress, match="neither a public address"):
             reach.checked(host, port, ["8.8.8.8", "10.0.0.7"])
     with pytest.raises(ForbiddenAddress, match="not this machine"):
-        Reach("localhost", 80, on_this_machine=True).checked("localhost", 80, ["127.0.0.1", "8.8.8.8"])
+        AllowedServers("localhost", 80, on_this_machine=True).checked("localhost", 80, ["127.0.0.1", "8.8.8.8"])
 
 
 Names = Callable[[dict[str, list[list[str]]]], list[str]]
@@ -275,7 +275,7 @@ def nobody_knows_localhost(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_localhost_is_this_machine_where_no_name_service_knows_it(host: str, nobody_knows_localhost: None) -> None:
     assert addresses_of(host, 80, 5) == ["127.0.0.1", "::1"]
     with pytest.raises(ForbiddenAddress):
-        Reach("api.vendor.example", 443).checked(host, 80, addresses_of(host, 80, 5))
+        AllowedServers("api.vendor.example", 443).checked(host, 80, addresses_of(host, 80, 5))
     with pytest.raises(UnknownName):
         addresses_of("localhost.example", 80, 5)
 

@@ -14,17 +14,17 @@ from manitwin.config import ServicesConfig
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Rejected, Unavailable
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.services.http import FormFile, HttpService
-from manitwin.models.services.refusal import Gone, NotTaken, Refusal, Unanswered
+from manitwin.models.services.refusal import AnswerLost, NotFound, Refusal, RequestRejected
 from scripted_service import KEY, OK, Client, Script, error_of
 
 STATUSES = [
     (401, AccessDenied, 1),
     (402, AccessDenied, 1),
     (403, AccessDenied, 1),
-    (400, NotTaken, 1),
-    (404, Gone, 1),
-    (410, Gone, 1),
-    (422, NotTaken, 1),
+    (400, RequestRejected, 1),
+    (404, NotFound, 1),
+    (410, NotFound, 1),
+    (422, RequestRejected, 1),
     (429, RateLimited, 3),
     (500, Unavailable, 3),
     (502, Unavailable, 3),
@@ -52,7 +52,7 @@ PAID = [
     (503, Unavailable, 3),
     (500, Unavailable, 1),
     (502, Unavailable, 1),
-    (504, Unanswered, 1),
+    (504, AnswerLost, 1),
 ]
 
 
@@ -93,7 +93,7 @@ def test_connection_refused_is_tried_again_even_for_a_paid_submit(pays: bool) ->
     assert type(error) is Unavailable and client.waits == [1, 2] and url in str(error)
 
 
-@pytest.mark.parametrize(("pays", "kind", "requests"), [(False, Unavailable, 3), (True, Unanswered, 1)])
+@pytest.mark.parametrize(("pays", "kind", "requests"), [(False, Unavailable, 3), (True, AnswerLost, 1)])
 def test_silence_after_the_request_was_sent(pays: bool, kind: type, requests: int) -> None:
     def silent(request: Request) -> Response:
         time.sleep(1.5)
@@ -104,14 +104,14 @@ def test_silence_after_the_request_was_sent(pays: bool, kind: type, requests: in
     assert type(error) is kind and len(server.requests) == requests
 
 
-@pytest.mark.parametrize(("pays", "kind", "requests"), [(False, Unavailable, 3), (True, Unanswered, 1)])
+@pytest.mark.parametrize(("pays", "kind", "requests"), [(False, Unavailable, 3), (True, AnswerLost, 1)])
 def test_answer_that_is_cut(pays: bool, kind: type, requests: int) -> None:
     with FakeServer(Script(Response(200, {"fine": True}, cut_after=4))) as server:
         error = error_of(lambda: Client(server.url).service.post_json("x", {}, pays=pays))
     assert type(error) is kind and len(server.requests) == requests
 
 
-@pytest.mark.parametrize(("pays", "kind"), [(False, BadReply), (True, Unanswered)])
+@pytest.mark.parametrize(("pays", "kind"), [(False, BadReply), (True, AnswerLost)])
 @pytest.mark.parametrize("body", [b"<html>", b"[1]", b"null", b"\xff\xfe", b"[" * 100_000])
 def test_answer_that_is_no_object(body: bytes, pays: bool, kind: type) -> None:
     with FakeServer(Script(Response(200, body))) as server:
@@ -130,7 +130,7 @@ def test_vendors_own_error_codes() -> None:
     def refusal(status: int, body: Any) -> Refusal | None:
         return Refusal(body["why"], body["kind"]) if "kind" in body else None
 
-    kinds = {"denied": AccessDenied, "busy": RateLimited, "down": Unavailable, "gone": Gone, "bad": BadReply}
+    kinds = {"denied": AccessDenied, "busy": RateLimited, "down": Unavailable, "gone": NotFound, "bad": BadReply}
     for name, kind in {**kinds, "input": Rejected}.items():
         with FakeServer(Script(Response(200, {"kind": name, "why": "words"}))) as server:
             error = error_of(lambda url=server.url: Client(url, refusal=refusal).service.get_json("x"))  # type: ignore[misc]

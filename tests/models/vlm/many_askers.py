@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from manitwin.models.vlm.answer_cache import Cached
+from manitwin.models.vlm.answer_cache import CachedChat
 from manitwin.models.vlm.prices import FREE
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
-from manitwin.models.vlm.replay import Recorded
+from manitwin.models.vlm.replay import RecordedChat
 
 
 def asked(vote: int) -> Question:
@@ -32,13 +32,13 @@ class Echo:
 
 
 def ask_cached(folder: Path, first: int, count: int) -> None:
-    chat = Cached(Echo(), folder)
+    chat = CachedChat(Echo(), folder)
     for vote in range(first, first + count):
         assert chat.ask(asked(vote)).text == f"answer to {vote}"
 
 
 def ask_recorded(path: Path, first: int, count: int) -> None:
-    chat = Recorded(Echo(100_000), path)
+    chat = RecordedChat(Echo(100_000), path)
     for vote in range(first, first + count):
         chat.ask(asked(vote))
 

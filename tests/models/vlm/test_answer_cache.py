@@ -10,26 +10,26 @@ from many_askers import Echo, ask_cached, asked, at_once
 from mug_question import KEY, MUG, Mug, Scripted, Waits, answer_mug, question, services
 
 from manitwin.config import VlmConfig
-from manitwin.engine.charges import counted
+from manitwin.engine.charges import record_charges
 from manitwin.errors import BadReply, Unavailable
 from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.openai_chat import FakeOpenAi
 from manitwin.models.fakes.server import FakeServer
-from manitwin.models.vlm.answer_cache import Cached, default_folder
+from manitwin.models.vlm.answer_cache import CachedChat, default_folder
 from manitwin.models.vlm.openai_chat import OpenAiChat
 from manitwin.models.vlm.protocol import Turn
 from manitwin.models.vlm.structured import ask
 
 
-def cached_chat(url: str, folder: Path, **changes: object) -> Cached:
-    return Cached(OpenAiChat("tiny-vl", f"{url}/v1", KEY, VlmConfig(**changes), services(), Waits()), folder)
+def cached_chat(url: str, folder: Path, **changes: object) -> CachedChat:
+    return CachedChat(OpenAiChat("tiny-vl", f"{url}/v1", KEY, VlmConfig(**changes), services(), Waits()), folder)
 
 
 def test_same_question_is_asked_and_charged_once(tmp_path: Path) -> None:
     with FakeServer(FakeOpenAi(None, KEY, answer_mug)) as server:
-        with counted() as first:
+        with record_charges() as first:
             reply = cached_chat(server.url, tmp_path).ask(question())
-        with counted() as second:
+        with record_charges() as second:
             assert cached_chat(server.url, tmp_path).ask(question()) == reply
     assert len(server.requests) == 1
     assert (first.usd > 0, second.usd) == (True, 0.0)
@@ -60,7 +60,7 @@ def test_failure_is_not_kept(tmp_path: Path) -> None:
 
 def test_conversation_that_led_nowhere_is_forgotten(tmp_path: Path) -> None:
     inner = Scripted(["no", "no again", "no", json.dumps(MUG)])
-    chat = Cached(inner, tmp_path)
+    chat = CachedChat(inner, tmp_path)
     with pytest.raises(BadReply):
         ask(chat, question(), Mug)
     assert ask(chat, question(), Mug).value.material == "glass"  # asked anew, and repaired
@@ -74,7 +74,7 @@ def test_conversation_that_led_nowhere_is_forgotten(tmp_path: Path) -> None:
 )
 def test_file_that_cannot_be_read_is_replaced(tmp_path: Path, content: str) -> None:
     inner = Scripted(["one", "two"])
-    chat = Cached(inner, tmp_path)
+    chat = CachedChat(inner, tmp_path)
     chat.ask(question())
     (path,) = tmp_path.rglob("*.json")
     path.write_text(content)
@@ -103,7 +103,7 @@ def test_processes_share_a_folder(tmp_path: Path) -> None:
     assert at_once(ask_cached, [(tmp_path, 0, 20), (tmp_path, 0, 20)]) == [0, 0]
     assert len(list(tmp_path.rglob("*.json"))) == 20
     assert not list(tmp_path.rglob("*.part"))
-    silent = Cached(Echo(), tmp_path)
+    silent = CachedChat(Echo(), tmp_path)
     assert [silent.ask(asked(vote)).text for vote in range(20)] == [f"answer to {vote}" for vote in range(20)]
 
 
@@ -116,17 +116,17 @@ def test_folder_is_where_caches_of_the_user_are(monkeypatch: pytest.MonkeyPatch,
 
 
 def test_a_kept_answer_of_a_rehearsal_stays_one(tmp_path: Path) -> None:
-    with FakeServer(FakeOpenAi(None, KEY, answer_mug)) as server, counted() as asked_of_it:
+    with FakeServer(FakeOpenAi(None, KEY, answer_mug)) as server, record_charges() as asked_of_it:
         cached_chat(server.url, tmp_path).ask(question())
-    with counted() as kept:
+    with record_charges() as kept:
         cached_chat(server.url, tmp_path).ask(question())
     assert asked_of_it.rehearsed and kept.rehearsed
 
 
 def test_a_models_answer_is_no_rehearsal(tmp_path: Path) -> None:
     for _ in range(2):
-        with counted() as bill:
-            Cached(Scripted(["a"]), tmp_path).ask(question())
+        with record_charges() as bill:
+            CachedChat(Scripted(["a"]), tmp_path).ask(question())
         assert not bill.rehearsed
 
 

@@ -11,7 +11,7 @@ import pytest
 from mug_question import KEY, MUG, PRICE, Mug, Waits, answer_mug, question, services
 
 from manitwin.config import VlmConfig
-from manitwin.engine.charges import counted
+from manitwin.engine.charges import record_charges
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Unavailable
 from manitwin.models.fakes.anthropic_messages import FakeAnthropic
 from manitwin.models.fakes.faults import ALWAYS, Faults
@@ -33,7 +33,7 @@ def fake(faults: dict[str, int] | None = None, **options: Any) -> Iterator[FakeS
 
 
 def test_question_is_answered_and_charged() -> None:
-    with fake() as server, counted() as bill:
+    with fake() as server, record_charges() as bill:
         reply = chat(server).ask(question())
     assert (json.loads(reply.text), reply.model) == (MUG, "claude-x")
     used = reply.usage
@@ -72,14 +72,14 @@ def test_what_waiting_cannot_help_is_asked_once(fault: str, error: type[Exceptio
 
 @pytest.mark.parametrize("fault", ["refusal", "cut_answer"])
 def test_answer_that_cannot_be_used_is_charged_all_the_same(fault: str) -> None:
-    with fake({fault: 1}) as server, counted() as bill, pytest.raises(BadReply):
+    with fake({fault: 1}) as server, record_charges() as bill, pytest.raises(BadReply):
         chat(server).ask(question())
     assert bill.usd > 0
 
 
 @pytest.mark.parametrize("fault", ["server_error", "disconnects"])
 def test_fault_once_is_tried_again_and_charged_once(fault: str) -> None:
-    with fake({fault: 1}) as server, counted() as bill:
+    with fake({fault: 1}) as server, record_charges() as bill:
         reply = chat(server).ask(question())
     assert len(server.requests) == 2
     used = reply.usage
@@ -88,7 +88,7 @@ def test_fault_once_is_tried_again_and_charged_once(fault: str) -> None:
 
 @pytest.mark.parametrize("fault", ["server_error", "disconnects"])
 def test_fault_that_stays_is_unavailable(fault: str) -> None:
-    with fake({fault: ALWAYS}) as server, counted() as bill, pytest.raises(Unavailable):
+    with fake({fault: ALWAYS}) as server, record_charges() as bill, pytest.raises(Unavailable):
         chat(server, retries=2).ask(question())
     assert (len(server.requests), bill.usd) == (3, 0.0)
 

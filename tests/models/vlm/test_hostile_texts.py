@@ -9,7 +9,7 @@ import pytest
 from mug_question import MUG, Mug, Scripted, Waits, question, services
 
 from manitwin.config import VlmConfig
-from manitwin.engine.charges import counted
+from manitwin.engine.charges import record_charges
 from manitwin.errors import BadReply
 from manitwin.models.fakes.server import FakeServer, Response
 from manitwin.models.vlm.anthropic_messages import AnthropicMessages
@@ -98,7 +98,10 @@ NO_COUNTS: list[Any] = [-1, -(10**400), 10**400, MOST_TOKENS + 1, "5", None, [],
 def test_count_of_tokens_that_is_none_is_estimated_instead(name: str, count: Any) -> None:
     kind, answer, parts = CHATS[name]
     for part in parts:
-        with FakeServer(Script(Response(200, answer(json.dumps(MUG), **{part: count})))) as server, counted() as bill:
+        with (
+            FakeServer(Script(Response(200, answer(json.dumps(MUG), **{part: count})))) as server,
+            record_charges() as bill,
+        ):
             reply = kind("m", server.url, None, VlmConfig(), services(), Waits()).ask(question())
         assert 0 < reply.usage.input_tokens < 2000 and 0 <= reply.usage.output_tokens < 100
         assert 0 < bill.usd < 0.01
@@ -109,7 +112,7 @@ def test_answer_of_too_many_characters_is_refused_and_charged(name: str) -> None
     kind, answer, _ = CHATS[name]
     with (
         FakeServer(Script(Response(200, answer("x" * (MOST_CHARACTERS + 1))))) as server,
-        counted() as bill,
+        record_charges() as bill,
         pytest.raises(BadReply, match=f"more than {MOST_CHARACTERS} characters"),
     ):
         kind("m", server.url, None, VlmConfig(), services(), Waits()).ask(question())

@@ -15,7 +15,7 @@ from mug_question import KEY, MUG, PRICE, Mug, Waits, answer_mug, question, serv
 from pydantic import BaseModel
 
 from manitwin.config import VlmConfig
-from manitwin.engine.charges import counted
+from manitwin.engine.charges import record_charges
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Unavailable
 from manitwin.models.fakes.faults import ALWAYS, Faults
 from manitwin.models.fakes.openai_chat import FakeOpenAi
@@ -38,7 +38,7 @@ def fake(faults: dict[str, int] | None = None, **options: Any) -> Iterator[FakeS
 
 
 def test_question_is_answered_and_charged_by_the_tokens_that_the_server_counts() -> None:
-    with fake() as server, counted() as bill:
+    with fake() as server, record_charges() as bill:
         reply = chat(server).ask(question())
     assert json.loads(reply.text) == MUG
     assert reply.model == "tiny-vl"
@@ -84,7 +84,7 @@ def test_what_waiting_cannot_help_is_asked_once(fault: str, error: type[Exceptio
 
 @pytest.mark.parametrize("fault", ["refusal", "cut_answer", "empty_answer"])
 def test_answer_that_cannot_be_used_is_charged_all_the_same(fault: str) -> None:
-    with fake({fault: 1}) as server, counted() as bill, pytest.raises(BadReply):
+    with fake({fault: 1}) as server, record_charges() as bill, pytest.raises(BadReply):
         chat(server).ask(question())
     assert bill.usd > 0
 
@@ -93,7 +93,7 @@ def test_answer_that_cannot_be_used_is_charged_all_the_same(fault: str) -> None:
 def test_refused_request_is_not_charged(fault: str) -> None:
     with (
         fake({fault: ALWAYS}) as server,
-        counted() as bill,
+        record_charges() as bill,
         pytest.raises((AccessDenied, Unavailable, RateLimited)),
     ):
         chat(server).ask(question())
@@ -102,7 +102,7 @@ def test_refused_request_is_not_charged(fault: str) -> None:
 
 def test_server_error_once_is_tried_again() -> None:
     waits = Waits()
-    with fake({"server_error": 1}) as server, counted() as bill:
+    with fake({"server_error": 1}) as server, record_charges() as bill:
         reply = chat(server, waits=waits).ask(question())
     assert json.loads(reply.text) == MUG
     assert len(server.requests) == 2
@@ -325,7 +325,7 @@ def test_body_of_another_form_is_a_bad_reply(body: bytes) -> None:
 
 def test_tokens_are_estimated_where_the_server_counts_none() -> None:
     said = {"choices": [{"message": {"content": json.dumps(MUG)}, "finish_reason": "stop"}]}
-    with FakeServer(Script(Response(200, said))) as server, counted() as bill:
+    with FakeServer(Script(Response(200, said))) as server, record_charges() as bill:
         reply = chat(server).ask(question())
     assert reply.usage.output_tokens == -(-len(reply.text) // 4)
     assert bill.usd > 0

@@ -10,20 +10,20 @@ from many_askers import Echo, ask_recorded, asked, at_once
 from mug_question import KEY, MUG, Mug, Scripted, Waits, answer_mug, question, services
 
 from manitwin.config import VlmConfig
-from manitwin.engine.charges import counted
+from manitwin.engine.charges import record_charges
 from manitwin.errors import BadReply, ConfigError
 from manitwin.models.fakes.openai_chat import FakeOpenAi
 from manitwin.models.fakes.server import FakeServer
 from manitwin.models.vlm.openai_chat import OpenAiChat
-from manitwin.models.vlm.replay import Recorded, Replay
+from manitwin.models.vlm.replay import RecordedChat, Replay
 from manitwin.models.vlm.structured import ask
 
 
 def test_recorded_conversation_is_given_again(tmp_path: Path) -> None:
     path = tmp_path / "answers.jsonl"
-    recorded = ask(Recorded(Scripted(["no", json.dumps(MUG)]), path), question(), Mug)
+    recorded = ask(RecordedChat(Scripted(["no", json.dumps(MUG)]), path), question(), Mug)
     replay = Replay(path)
-    with counted() as bill:
+    with record_charges() as bill:
         assert ask(replay, question(), Mug) == recorded
     assert (replay.name, replay.model, bill.usd) == ("replay", "scripted-1", 0.0)
     assert replay.ask(question()).model == "scripted-1-0711"
@@ -31,7 +31,7 @@ def test_recorded_conversation_is_given_again(tmp_path: Path) -> None:
 
 def test_what_was_not_recorded_is_said(tmp_path: Path) -> None:
     path = tmp_path / "answers.jsonl"
-    Recorded(Scripted(["x"]), path).ask(question())
+    RecordedChat(Scripted(["x"]), path).ask(question())
     with pytest.raises(BadReply, match=r"answers.jsonl: no answer to 'mug' \(vote 4\)"):
         Replay(path).ask(question(vote=4))
 
@@ -39,16 +39,16 @@ def test_what_was_not_recorded_is_said(tmp_path: Path) -> None:
 def test_same_answer_is_recorded_once_and_another_one_replaces_it(tmp_path: Path) -> None:
     path = tmp_path / "answers.jsonl"
     for text in ("a", "a", "b"):
-        Recorded(Scripted([text]), path).ask(question())
+        RecordedChat(Scripted([text]), path).ask(question())
     assert len(path.read_text().splitlines()) == 2
     assert Replay(path).ask(question()).text == "b"
 
 
 def test_record_is_of_one_model(tmp_path: Path) -> None:
     path = tmp_path / "answers.jsonl"
-    Recorded(Scripted(["a"]), path).ask(question())
+    RecordedChat(Scripted(["a"]), path).ask(question())
     with pytest.raises(ConfigError, match="records scripted-1, not another"):
-        Recorded(Scripted([], model="another"), path)
+        RecordedChat(Scripted([], model="another"), path)
     path.write_text(path.read_text() + path.read_text().replace('"scripted-1"', '"another"'))
     with pytest.raises(ConfigError, match="another, scripted-1"):
         Replay(path)
@@ -74,16 +74,16 @@ def test_missing_file_is_said(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"gone\.jsonl: cannot be opened"):
         Replay(tmp_path / "gone.jsonl")
     with pytest.raises(ConfigError, match="cannot be written"):
-        Recorded(Scripted([]), tmp_path)
+        RecordedChat(Scripted([]), tmp_path)
 
 
 def test_line_that_a_crash_cut_is_written_over(tmp_path: Path) -> None:
     path = tmp_path / "answers.jsonl"
-    Recorded(Scripted(["a"]), path).ask(question())
+    RecordedChat(Scripted(["a"]), path).ask(question())
     whole = path.read_bytes()
     path.write_bytes(whole + whole[: len(whole) // 2])
     assert Replay(path).ask(question()).text == "a"
-    Recorded(Scripted(["b"]), path).ask(question(vote=1))
+    RecordedChat(Scripted(["b"]), path).ask(question(vote=1))
     assert [json.loads(line)["text"] for line in path.read_text().splitlines()] == ["a", "b"]
 
 
@@ -103,7 +103,7 @@ def test_neither_key_nor_address_is_recorded(tmp_path: Path) -> None:
     path = tmp_path / "answers.jsonl"
     with FakeServer(FakeOpenAi(None, KEY, answer_mug)) as server:
         chat = OpenAiChat("tiny-vl", f"{server.url}/v1", KEY, VlmConfig(), services(), Waits())
-        Recorded(chat, path).ask(question())
+        RecordedChat(chat, path).ask(question())
     content = path.read_text()
     assert KEY not in content and "127.0.0.1" not in content
 
@@ -112,11 +112,11 @@ def test_what_a_rehearsal_answered_is_one_when_it_is_replayed(tmp_path: Path) ->
     path = tmp_path / "answers.jsonl"
     with FakeServer(FakeOpenAi(None, KEY, answer_mug)) as server:
         chat = OpenAiChat("tiny-vl", f"{server.url}/v1", KEY, VlmConfig(), services(), Waits())
-        Recorded(chat, path).ask(question())
-    with counted() as replayed:
+        RecordedChat(chat, path).ask(question())
+    with record_charges() as replayed:
         Replay(path).ask(question())
     assert replayed.rehearsed
-    Recorded(Scripted(["x"]), tmp_path / "models.jsonl").ask(question())
-    with counted() as of_a_model:
+    RecordedChat(Scripted(["x"]), tmp_path / "models.jsonl").ask(question())
+    with record_charges() as of_a_model:
         Replay(tmp_path / "models.jsonl").ask(question())
     assert not of_a_model.rehearsed

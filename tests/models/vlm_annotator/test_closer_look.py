@@ -14,7 +14,7 @@ from handmade import mug
 from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import CloserLook, LooksCloser, PointsRequest
 from manitwin.models.annotators.rules import RulesAnnotator
-from manitwin.models.annotators.vlm.closer_look import PLACES, Nearby, nearby_places
+from manitwin.models.annotators.vlm.closer_look import PLACES, PlaceSet, nearby_places
 from manitwin.models.annotators.vlm.place_checks import PlaceChecks
 from manitwin.models.vlm.protocol import Picture, Question
 from manitwin.render.cameras import project
@@ -45,16 +45,16 @@ def points(request_of_mug: PointsRequest) -> list[FunctionalPoint]:
 
 
 @pytest.fixture(scope="module")
-def nearby(request_of_mug: PointsRequest, points: list[FunctionalPoint]) -> list[Nearby]:
+def nearby(request_of_mug: PointsRequest, points: list[FunctionalPoint]) -> list[PlaceSet]:
     return nearby_places(PlaceChecks(request_of_mug), points, 256)
 
 
-def highest(of: Nearby) -> str:
+def highest(of: PlaceSet) -> str:
     return str(of.numbers[int(of.positions_m[:, 2].argmax())])
 
 
 def test_places_are_around_the_point_on_its_part_and_in_the_picture(
-    nearby: list[Nearby], points: list[FunctionalPoint]
+    nearby: list[PlaceSet], points: list[FunctionalPoint]
 ) -> None:
     assert [each.letter for each in nearby] == ["A", "B"]
     for each, asked in zip(nearby, points, strict=True):
@@ -71,7 +71,7 @@ def test_places_are_around_the_point_on_its_part_and_in_the_picture(
 
 
 def test_chosen_places_come_back_by_point_and_the_own_place_is_no_move(
-    request_of_mug: PointsRequest, nearby: list[Nearby], points: list[FunctionalPoint]
+    request_of_mug: PointsRequest, nearby: list[PlaceSet], points: list[FunctionalPoint]
 ) -> None:
     rim, handle = nearby
     own = str(handle.numbers[int(np.linalg.norm(handle.positions_m - points[1].position_m, axis=1).argmin())])
@@ -97,7 +97,7 @@ def test_chosen_places_come_back_by_point_and_the_own_place_is_no_move(
 
 
 def test_number_of_another_picture_is_no_answer(
-    request_of_mug: PointsRequest, nearby: list[Nearby], points: list[FunctionalPoint]
+    request_of_mug: PointsRequest, nearby: list[PlaceSet], points: list[FunctionalPoint]
 ) -> None:
     beyond: dict[str, Any] = {each.letter: {"rationale": "", "id": "13"} for each in nearby}
     with pytest.raises(BadReply, match="closer_look"):

@@ -10,7 +10,7 @@ import pytest
 from scripted_chat import ScriptedChat, annotator, changed
 
 from manitwin.errors import BadReply
-from manitwin.models.annotators.vlm.template_choice import NONE_OF_THESE, Shown, choice_answer
+from manitwin.models.annotators.vlm.template_choice import NONE_OF_THESE, TemplateInput, choice_answer
 from manitwin.models.annotators.vlm.template_likeness import FIRST_LOOK, Likeness, likeness_answer
 from manitwin.models.annotators.vlm.template_measures import filled_answer
 from manitwin.models.annotators.vlm.template_reader import TemplateReader
@@ -20,7 +20,7 @@ from manitwin.models.vlm.prices import TokenPrice
 from manitwin.models.vlm.protocol import Picture
 from manitwin.models.vlm.strict_schema import strict_schema
 
-SQUAT = Shown(None, "a squat blue espresso mug with a thick handle", None)
+SQUAT = TemplateInput(None, "a squat blue espresso mug with a thick handle", None)
 MUG: dict[str, Any] = {
     "shown": "Squat, blue.",
     "measures": {"height_m": 0.08, "width": 1.0, "wall_m": None, "taper": None, "handle": 0.4},
@@ -59,7 +59,7 @@ def test_forms_are_taken_by_both_vendors_and_the_categories_are_the_templates() 
 
 def test_photo_is_shown_cut_out_and_the_sentence_is_quoted() -> None:
     chat = ScriptedChat(choice("mug"))
-    assert reader(chat).choose(Shown(photo(), None, "cup")).category == "mug"
+    assert reader(chat).choose(TemplateInput(photo(), None, "cup")).category == "mug"
     assert reader(chat).choose(SQUAT).category == "mug"
     (seen, _), *_, (read, _) = chat.asked
     assert "The user calls it: cup." in str(seen.parts[0]) and sum(isinstance(p, Picture) for p in seen.parts) == 1
@@ -71,7 +71,7 @@ def test_none_of_these_is_an_answer_and_a_template_against_the_name_is_asked_aga
     assert reader(chat).choose(SQUAT) == reader(chat).choose(SQUAT)
     assert reader(chat).choose(SQUAT).category is None and all(not turns for _, turns in chat.asked)
     chat = ScriptedChat(choice("spoon"))
-    chosen = reader(chat).choose(Shown(photo(), None, "mug"))
+    chosen = reader(chat).choose(TemplateInput(photo(), None, "mug"))
     assert chosen.category == "spoon" and "the user calls it 'mug'" in chosen.findings[0] and len(chat.asked) == 2
 
 
@@ -131,7 +131,7 @@ def test_measures_and_looks_are_what_was_said() -> None:
 
 
 def compared(*answers: dict[str, Any]) -> tuple[ScriptedChat, Likeness]:
-    chat, measures = ScriptedChat(*answers), load_templates()["mug"].typical()
+    chat, measures = ScriptedChat(*answers), load_templates()["mug"].typical_measures()
     return chat, reader(chat).compare(SQUAT, "mug", measures, [], FIRST_LOOK)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from manitwin.errors import UsageError
 from manitwin.models.weights.catalog import KNOWN_WEIGHTS
-from manitwin.models.weights.store import FOLDER, read_stored, store, stored, weights_folder
+from manitwin.models.weights.store import FOLDER, find_stored, read_stored, store, weights_folder
 
 WEIGHTS = replace(KNOWN_WEIGHTS["isnet"], sha256=hashlib.sha256(b"network").hexdigest())
 
@@ -30,9 +30,9 @@ def test_the_folder_is_the_named_one_or_that_of_the_desktop(tmp_path: Path, monk
 
 
 def test_what_was_stored_is_read_with_its_licence(folder: Path) -> None:
-    assert stored("isnet") is None
+    assert find_stored("isnet") is None
     store(WEIGHTS, b"network")
-    found = stored("isnet")
+    found = find_stored("isnet")
     assert found is not None and found.path.parent == folder and "MIT" in found.licence
     assert read_stored(found) == b"network"
     assert sorted(path.suffix for path in folder.iterdir()) == [".json", ".onnx"]
@@ -50,7 +50,7 @@ def test_a_broken_record_is_refused_with_its_remedy(folder: Path, record: str) -
     folder.mkdir()
     (folder / "isnet.json").write_text(record)
     with pytest.raises(UsageError, match="manitwin models add isnet"):
-        stored("isnet")
+        find_stored("isnet")
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

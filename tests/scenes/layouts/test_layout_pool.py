@@ -9,10 +9,10 @@ import pytest
 
 from articulated_twins import write_articulated
 from manitwin.errors import TwinError, UsageError
-from manitwin.scenes.layouts.layouts_run import without_upright
-from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose, pool_of, read_pool
+from manitwin.scenes.layouts.layouts_run import twins_without_upright
+from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose, cached_pool, read_pool
 from manitwin.twin.dataset_root import twin_name
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from scene_twins import BOWL_HEIGHT_M, THINGS, bowl, pool_of_things, slab, write_thing, write_things
 from twin_folders import write_rejected
 
@@ -55,7 +55,7 @@ def test_upright_pool_keeps_other_placements_only_where_none_is_upright() -> Non
         [PoolTwin("aa", "r", "cup", (lying, standing), False), PoolTwin("bb", "r", "fork", (lying,), False)],
         lambda _: body,
     )
-    assert [twin.stands for twin in pool.twins] == [True, False]
+    assert [twin.has_upright_pose for twin in pool.twins] == [True, False]
     assert [twin.poses for twin in pool.upright.twins] == [(standing,), (lying,)]
     assert [twin.poses for twin in pool.twins] == [(lying, standing), (lying,)]
     assert pool.upright.body("aa") is pool.body("aa")
@@ -63,22 +63,22 @@ def test_upright_pool_keeps_other_placements_only_where_none_is_upright() -> Non
 
 def test_twins_without_an_upright_placement_that_stayed_are_named(tmp_path: Path) -> None:
     ids = write_things(tmp_path, THINGS[:2])
-    assert without_upright(tmp_path) == ()
+    assert twins_without_upright(tmp_path) == ()
     folder = tmp_path / twin_name(ids[1])
     record = json.loads((folder / RECORD).read_bytes())
     for placement in record["placements"]:
         placement["upright"] = not placement["upright"]  # the one that is upright now did not stay
     del record["revision"], record["files"]
-    seal(folder, record)
-    pool_of.cache_clear()
-    assert without_upright(tmp_path) == (ids[1],)
+    write_twin_record(folder, record)
+    cached_pool.cache_clear()
+    assert twins_without_upright(tmp_path) == (ids[1],)
 
 
 def test_twins_with_joints_are_counted_as_the_rigid_bodies_that_they_are_here(tmp_path: Path) -> None:
     write_articulated(tmp_path / "one")
-    assert read_pool(tmp_path).about_joints == "twins with joints, each one rigid body here as it stands: 1"
+    assert read_pool(tmp_path).joints_remark == "twins with joints, each one rigid body here as it stands: 1"
     write_things(tmp_path / "rigid", THINGS[:2])
-    assert read_pool(tmp_path / "rigid").about_joints is None
+    assert read_pool(tmp_path / "rigid").joints_remark is None
 
 
 def test_place_without_twins_says_so(tmp_path: Path) -> None:

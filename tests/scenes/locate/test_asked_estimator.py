@@ -13,8 +13,8 @@ from located_views import BrickView, brick_view
 from manitwin.config import ServicesConfig
 from manitwin.models.fakes.catalog import serving
 from manitwin.models.pose_estimators.from_spec import pose_estimator
-from manitwin.scenes.locate.asked_estimator import AskedEstimator, pose_request
 from manitwin.scenes.locate.estimate import locate_in_view, pose_distances_m
+from manitwin.scenes.locate.external_estimator import ExternalEstimator, pose_request
 from manitwin.scenes.locate.pose_model import PoseModel
 
 SERVICES = ServicesConfig(retries=0, timeout_s=120)
@@ -26,8 +26,8 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> BrickView:
     return brick_view(tmp_path_factory.mktemp("brick"))
 
 
-def asked(seen: BrickView, spec: str) -> AskedEstimator:
-    return AskedEstimator(pose_estimator(spec, SERVICES), lambda twin_id: seen.twin, 7)
+def asked(seen: BrickView, spec: str) -> ExternalEstimator:
+    return ExternalEstimator(pose_estimator(spec, SERVICES), lambda twin_id: seen.twin, 7)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import pytest
 
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import quaternion_wxyz, transform
-from manitwin.scenes.locate.base_file import read_base
+from manitwin.scenes.locate.hand_eye_file import read_camera_to_base
 
 TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
@@ -24,16 +24,18 @@ def written(folder: Path, told: Any) -> Path:
 
 def test_a_matrix_and_a_quaternion_say_the_same(tmp_path: Path) -> None:
     pose = transform(TURN, np.array([0.4, -0.1, 0.7]))
-    by_matrix = read_base(written(tmp_path, {"camera_to_base": pose.tolist()}))
+    by_matrix = read_camera_to_base(written(tmp_path, {"camera_to_base": pose.tolist()}))
     quaternion = np.asarray(quaternion_wxyz(TURN)).tolist()
-    by_quaternion = read_base(written(tmp_path, {"position_m": [0.4, -0.1, 0.7], "quaternion_wxyz": quaternion}))
+    by_quaternion = read_camera_to_base(
+        written(tmp_path, {"position_m": [0.4, -0.1, 0.7], "quaternion_wxyz": quaternion})
+    )
     assert by_matrix == pytest.approx(pose) and by_quaternion == pytest.approx(pose)
 
 
 def test_a_rounded_rotation_is_made_one_again(tmp_path: Path) -> None:
     turn = np.round(np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0], 4)
     turn *= np.sign(np.linalg.det(turn))
-    pose = read_base(written(tmp_path, {"camera_to_base": transform(turn, np.zeros(3)).tolist()}))
+    pose = read_camera_to_base(written(tmp_path, {"camera_to_base": transform(turn, np.zeros(3)).tolist()}))
     assert pose[:3, :3] @ pose[:3, :3].T == pytest.approx(np.eye(3), abs=1e-12)
 
 
@@ -52,4 +54,4 @@ def test_a_rounded_rotation_is_made_one_again(tmp_path: Path) -> None:
 )
 def test_what_is_no_pose_is_refused(told: Any, said: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=said):
-        read_base(written(tmp_path, told))
+        read_camera_to_base(written(tmp_path, told))

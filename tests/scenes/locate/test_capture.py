@@ -15,11 +15,11 @@ from manitwin.cli.main import app
 from manitwin.errors import Unavailable, UsageError
 from manitwin.geometry.poses import inverse, transform_points
 from manitwin.scenes.loaded_scene import object_pose
-from manitwin.scenes.locate.base_file import read_base
-from manitwin.scenes.locate.captured import capture_files, write_capture
+from manitwin.scenes.locate.capture_folder import capture_files, write_capture
+from manitwin.scenes.locate.hand_eye_file import read_camera_to_base
 from manitwin.scenes.locate.input_files import read_view
-from manitwin.scenes.locate.realsense import WARM_UP, record, sdk
-from manitwin.scenes.locate.rehearsed_capture import capture_of_scene
+from manitwin.scenes.locate.realsense import WARM_UP, capture_view, sdk
+from manitwin.scenes.locate.simulated_capture import capture_of_scene
 from manitwin.scenes.perception.scene_truth import read_scene_truth
 from manitwin.scenes.scene_files import scene_files
 
@@ -40,7 +40,7 @@ def test_a_layout_is_seen_as_it_stands_in_the_robots_frame(scene: Path, tmp_path
     known = (view.depth_m > 0) & (true_m > 0)
     off = np.abs(view.depth_m - true_m)[known]
     assert known.mean() > 0.6 * (true_m > 0).mean() and 0.0005 < np.median(off) < 0.004, "noise, and no shift"
-    base_to_camera = inverse(read_base(files["base"]))
+    base_to_camera = inverse(read_camera_to_base(files["base"]))
     for thing in truth.record.objects:
         mask = capture.masks.get(thing.name)
         if mask is not None and mask.sum() > 300:
@@ -64,7 +64,7 @@ def test_a_scene_without_that_camera_and_a_folder_of_several_are_refused(scene: 
 
 def test_a_camera_is_warmed_up_and_its_depths_are_medians_of_known_ones(tmp_path: Path) -> None:
     rs = FakeRealSense()
-    seen = record(rs, serial="0123")
+    seen = capture_view(rs, serial="0123")
     assert rs.calls == ["serial 0123", "depth z16", "color rgb8", "stop"]
     assert seen.depth_m[10, 10] == pytest.approx(0.7) and seen.depth_m[10, 3] in (0.0, pytest.approx(0.7))
     assert seen.depth_m[0, 0] == 0 and seen.rgb[0, 0, 0] > WARM_UP
@@ -80,19 +80,19 @@ def test_a_recorded_file_is_played_to_its_end(tmp_path: Path) -> None:
     bag = tmp_path / "recorded.bag"
     bag.write_bytes(b"#ROSBAG V2.0")
     rs = FakeRealSense()
-    seen = record(rs, bag=bag)
+    seen = capture_view(rs, bag=bag)
     assert seen.rgb[0, 0, 0] == FRAMES_OF_A_FILE and rs.calls == ["stop"]
     bag.write_bytes(b"anything")
     with pytest.raises(Unavailable, match="cannot start"):
-        record(rs, bag=bag)
+        capture_view(rs, bag=bag)
 
 
 def test_no_camera_and_a_bent_picture_are_refused_in_one_line() -> None:
     with pytest.raises(Unavailable, match="No device connected"):
-        record(FakeRealSense(plugged_in=False))
+        capture_view(FakeRealSense(plugged_in=False))
     bent = FakeRealSense(coeffs=(0.25, -0.2, 0.0, 0.0, 0.0))
     with pytest.raises(UsageError, match="its lens distorts the picture by up to"):
-        record(bent)
+        capture_view(bent)
     assert bent.calls[-1] == "stop", "the camera is let go"
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import trimesh
 
 from manitwin.geometry.poses import rotation_angle_rad, transform
-from manitwin.scenes.locate.comparison import Evidence, explained, polished
 from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.scenes.locate.pose_scoring import PixelSamples, refine_poses, score_poses
 from manitwin.scenes.locate.registration import align
-from manitwin.scenes.locate.search import climbed
+from manitwin.scenes.locate.search import hill_climb
 from seen_solids import seen_from
 
 TOLERANCE_M = 0.006
@@ -22,10 +22,10 @@ def moved(pose: np.ndarray, *, by_m: tuple[float, float, float]) -> np.ndarray:
 
 def test_the_true_pose_explains_all_and_less_the_farther_it_is_off(stool: PoseModel) -> None:
     seen = seen_from(stool, 0.6, noise=False)
-    evidence = Evidence.of(seen.view, seen.mask, 200, 4000, np.random.default_rng(0))
+    evidence = PixelSamples.sample(seen.view, seen.mask, 200, 4000, np.random.default_rng(0))
     true = seen.object_to_camera
     poses = np.array([true, *(moved(true, by_m=(0, 0, z)) for z in (0.003, -0.003, 0.006))])
-    scores = explained(stool, poses, evidence, TOLERANCE_M)
+    scores = score_poses(stool, poses, evidence, TOLERANCE_M)
     # 3 mm of 6 cost a quarter where the surface looks at the camera: 1 - (3 / 6)^2
     assert scores[0] > 0.995 and abs(scores[1] - 0.75) < 0.05 and abs(scores[2] - 0.75) < 0.05 and scores[3] < 0.1
 
@@ -34,13 +34,15 @@ def test_what_stands_before_what_is_seen_counts_against_and_what_is_hidden_does_
     stool: PoseModel,
 ) -> None:
     whole, half = seen_from(stool, 0.6, noise=False), seen_from(stool, 0.6, hidden_right=0.5, noise=False)
-    hidden = Evidence.of(half.view, half.mask, 200, 4000, np.random.default_rng(0))
-    assert explained(stool, half.object_to_camera[None], hidden, TOLERANCE_M)[0] > 0.99
+    hidden = PixelSamples.sample(half.view, half.mask, 200, 4000, np.random.default_rng(0))
+    assert score_poses(stool, half.object_to_camera[None], hidden, TOLERANCE_M)[0] > 0.99
     cut = whole.mask & half.mask  # the other half is seen, and is no part of the thing: a smaller one
     behind = whole.view.depth_m.copy()
     behind[whole.mask & ~half.mask] = 1.5
-    free = Evidence.of(type(whole.view)(behind, whole.view.intrinsics), cut, 200, 4000, np.random.default_rng(0))
-    assert abs(explained(stool, whole.object_to_camera[None], free, TOLERANCE_M)[0] - 0.5) < 0.03
+    free = PixelSamples.sample(
+        type(whole.view)(behind, whole.view.intrinsics), cut, 200, 4000, np.random.default_rng(0)
+    )
+    assert abs(score_poses(stool, whole.object_to_camera[None], free, TOLERANCE_M)[0] - 0.5) < 0.03
 
 
 def test_alignment_undoes_a_known_motion(stool: PoseModel) -> None:
@@ -50,20 +52,20 @@ def test_alignment_undoes_a_known_motion(stool: PoseModel) -> None:
     start = moved(true @ turn, by_m=(0.006, -0.004, 0.005))
     pixels = np.flatnonzero(seen.mask)[::7]
     found = align(seen.view.points(pixels), stool.surface, start[None], iterations=25, kept_share=0.95)
-    evidence = Evidence.of(seen.view, seen.mask, 200, 1500, np.random.default_rng(0))
-    finer = polished(stool, found, evidence, 0.004, 10)[0]
+    evidence = PixelSamples.sample(seen.view, seen.mask, 200, 1500, np.random.default_rng(0))
+    finer = refine_poses(stool, found, evidence, 0.004, 10)[0]
     off = np.linalg.inv(true) @ finer
     assert rotation_angle_rad(off[:3, :3]) < 0.01 and np.linalg.norm(off[:3, 3]) < 0.001
 
 
 def test_a_pose_beside_the_true_one_climbs_back_and_none_explains_less_than_before(stool: PoseModel) -> None:
     seen = seen_from(stool, 0.6, hidden_right=0.5)
-    evidence = Evidence.of(seen.view, seen.mask, 200, 800, np.random.default_rng(0))
+    evidence = PixelSamples.sample(seen.view, seen.mask, 200, 800, np.random.default_rng(0))
     true = seen.object_to_camera
     starts = np.array([moved(true, by_m=(0.005, -0.003, 0.004)), moved(true, by_m=(0.0, 0.008, 0.0)), true])
-    before = explained(stool, starts, evidence, TOLERANCE_M)
-    after = climbed(stool, starts, evidence, TOLERANCE_M)
-    scores = explained(stool, after, evidence, TOLERANCE_M)
+    before = score_poses(stool, starts, evidence, TOLERANCE_M)
+    after = hill_climb(stool, starts, evidence, TOLERANCE_M)
+    scores = score_poses(stool, after, evidence, TOLERANCE_M)
     assert (scores >= before).all() and (scores[:2] > before[:2] + 0.1).all()
     off_m = np.linalg.norm(after[:2, :3, 3] - true[:3, 3], axis=1)
     assert off_m.max() < 0.004

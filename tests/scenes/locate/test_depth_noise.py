@@ -15,7 +15,7 @@ K = np.array([[300.0, 0, 100], [0, 300, 100], [0, 0, 1]])
 @pytest.mark.parametrize("depth_m", [0.6, 1.2, 2.0])
 def test_the_spread_on_a_wall_is_that_of_the_model_and_is_measured_without_the_truth(depth_m: float) -> None:
     noise = DepthNoise()
-    told = noise.observed(np.full((200, 200), depth_m), np.random.default_rng(0))
+    told = noise.simulate_depth(np.full((200, 200), depth_m), np.random.default_rng(0))
     known = told[told > 0]
     wanted = float(noise.sigma_m(np.array([depth_m]))[0])
     assert known.std() == pytest.approx(wanted, rel=0.06)
@@ -27,7 +27,7 @@ def test_the_spread_on_a_wall_is_that_of_the_model_and_is_measured_without_the_t
 
 def test_depths_beside_a_jump_are_lost_and_none_is_invented() -> None:
     true = np.where(np.arange(200)[None] < 100, 0.7, 1.4) * np.ones((200, 1))
-    told = DepthNoise().observed(true, np.random.default_rng(0))
+    told = DepthNoise().simulate_depth(true, np.random.default_rng(0))
     assert (told[:, 98:102] == 0).mean() > 0.2 > (told[:, :80] == 0).mean()
     known = told[told > 0]
     assert np.minimum(np.abs(known - 0.7), np.abs(known - 1.4)).max() < 0.03

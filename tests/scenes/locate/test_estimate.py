@@ -12,7 +12,6 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from manitwin.geometry.poses import transform_points
-from manitwin.scenes.locate.comparison import Evidence, scores_of
 from manitwin.scenes.locate.estimate import (
     AMBIGUOUS_MARGIN,
     AMBIGUOUS_SIGMA,
@@ -23,6 +22,7 @@ from manitwin.scenes.locate.estimate import (
 )
 from manitwin.scenes.locate.input_files import read_view, view_of_cloud
 from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.scenes.locate.pose_scoring import PixelSamples, scores_of
 from manitwin.scenes.locate.search import Candidates, observed_points
 from seen_solids import seen_from
 
@@ -107,7 +107,7 @@ def candidates_of(far: int) -> Candidates:
     gains[:, :inside] = 1.0
     gains[1, :150], gains[1, inside : inside + far] = 0.0, -1.0
     nothing = np.zeros(inside + about)
-    evidence = Evidence(np.zeros((inside + about, 3)), nothing, nothing, weight, inside, nothing)
+    evidence = PixelSamples(np.zeros((inside + about, 3)), nothing, nothing, weight, inside, nothing)
     return Candidates(np.tile(np.eye(4), (2, 1, 1)), scores_of(gains, evidence), 0.005, evidence, gains)
 
 

@@ -15,7 +15,7 @@ from manitwin.scenes.loaded_scene import object_pose
 from manitwin.scenes.locate.layout_files import dataset_of_twin, layout_document, write_layout
 from manitwin.scenes.locate.located_scene import LocatedScene, located_scene
 from manitwin.scenes.locate.proposals import Plane, table_plane
-from manitwin.scenes.locate.world_frame import WorldFrame, world_of_base, world_of_table
+from manitwin.scenes.locate.world_frame import WorldFrame, base_world_frame, table_world_frame
 from manitwin.scenes.scene import SurfaceBox
 from manitwin.scenes.scene_files import dataset_of, read_scene, scene_files
 
@@ -31,7 +31,7 @@ def plane(seen: BrickView) -> Plane:
 
 
 def world_of(seen: BrickView, plane: Plane) -> WorldFrame:
-    return world_of_table(plane, transform_points(seen.object_to_camera, seen.model.center[None])[0])
+    return table_world_frame(plane, transform_points(seen.object_to_camera, seen.model.center[None])[0])
 
 
 def scene_of(seen: BrickView, plane: Plane, object_to_camera: np.ndarray) -> LocatedScene:
@@ -116,9 +116,9 @@ def test_a_calibration_gives_the_base_and_one_of_another_table_is_refused(seen: 
     about = transform_points(seen.object_to_camera, seen.model.center[None])[0]
     object_to_base = transform(None, np.array([0.4, -0.2, 0.03]))
     camera_to_base = object_to_base @ inverse(seen.object_to_camera)
-    world = world_of_base(camera_to_base, plane, about)
+    world = base_world_frame(camera_to_base, plane, about)
     assert world.calibrated and world.lean_rad < np.deg2rad(1) and world.table_m == pytest.approx(0.03, abs=0.004)
     brick = world.camera_to_world @ seen.object_to_camera
     assert brick[:3, 3] == pytest.approx([0.4, -0.2, 0.03], abs=0.004)
     with pytest.raises(UsageError, match=r"--base: the visible table leans by [56]\.\d degrees"):
-        world_of_base(turned((0, 1, 0), 5.5) @ camera_to_base, plane, about)
+        base_world_frame(turned((0, 1, 0), 5.5) @ camera_to_base, plane, about)

@@ -19,7 +19,7 @@ def test_a_scaled_model_is_that_of_the_scaled_mesh(stool: PoseModel) -> None:
     far, _ = twice.caster.first_hits(origin[None], down)
     near, _ = stool.caster.first_hits((stool.center + np.array([0, 0, 0.5]))[None], down)
     assert far[0] == pytest.approx(2 * near[0], abs=1e-6)
-    assert np.allclose(twice.same_poses[0], np.eye(4))
+    assert np.allclose(twice.symmetry_poses[0], np.eye(4))
 
 
 @pytest.mark.parametrize(

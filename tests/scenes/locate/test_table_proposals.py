@@ -9,7 +9,7 @@ from manitwin.errors import UsageError
 from manitwin.scenes.locate.depth_view import DepthView
 from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.scenes.locate.proposals import proposals, table_plane
-from manitwin.scenes.locate.recognition import where_is
+from manitwin.scenes.locate.recognition import find_twin_in_masks
 from seen_solids import seen_from
 
 
@@ -50,7 +50,7 @@ def test_of_several_things_the_twin_is_the_one_that_it_explains(stool: PoseModel
     seen = seen_from(stool, 0.6)
     other = np.zeros_like(seen.mask)
     other[5:40, 5:60] = True  # a piece of the wall
-    found = where_is(seen.view, [other, seen.mask], stool)
+    found = find_twin_in_masks(seen.view, [other, seen.mask], stool)
     assert found.location.status == "found" and np.array_equal(found.mask, seen.mask)
     with pytest.raises(UsageError, match="no object stands above"):
-        where_is(seen.view, [], stool)
+        find_twin_in_masks(seen.view, [], stool)

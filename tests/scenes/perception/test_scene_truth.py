@@ -14,7 +14,7 @@ from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform_points
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render.cameras import Camera
-from manitwin.render.raycast import cast_camera, merged
+from manitwin.render.raycast import cast_camera, merge_parts
 from manitwin.scenes.loaded_scene import object_pose
 from manitwin.scenes.perception.scene_truth import PictureTruth, SceneTruth, read_scene_truth
 from manitwin.scenes.scene_files import scene_files
@@ -26,7 +26,7 @@ def in_world(scenes: Path, truth: SceneTruth, name: str) -> tuple[trimesh.Trimes
     """The mesh of an object in the world, and the part of each of its faces."""
     thing = next(each for each in truth.record.objects if each.name == name)
     twin = Twin(scenes.parent / "set" / twin_name(thing.twin_id))
-    mesh = merged(twin.visual)
+    mesh = merge_parts(twin.visual)
     return trimesh.Trimesh(
         transform_points(object_pose(thing), mesh.vertices), mesh.faces, process=False
     ), twin.face_parts()

@@ -28,7 +28,7 @@ def test_the_page_counts_instances_pixels_and_parts_as_the_pictures_show_them(tr
                 pixels[thing.category] += count
             for number, part in truth.parts.items():
                 parts[f"{part.category}/{part.name}"] += bool((picture.parts == number).any())
-    text = segmentation_page(truths, Classes.of(truths), "coco", 0.0).decode()
+    text = segmentation_page(truths, Classes.from_scenes(truths), "coco", 0.0).decode()
     categories = rows_of(text, "Instances by category")
     assert {name: (int(row[0]), int(row[2].replace(",", ""))) for name, row in categories.items()} == {
         name: (instances[name], pixels[name]) for name in categories

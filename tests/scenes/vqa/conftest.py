@@ -9,7 +9,7 @@ import pytest
 from drawn_scenes import write_drawn_scenes
 from manitwin.scenes.scene_files import scene_files
 from manitwin.scenes.vqa.question import Question
-from manitwin.scenes.vqa.write import ask_scenes
+from manitwin.scenes.vqa.write import generate_questions
 
 
 @pytest.fixture(scope="package")
@@ -21,4 +21,4 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="package")
 def questions(scenes: Path) -> list[Question]:
     """As many questions about them as there are."""
-    return ask_scenes(scene_files(scenes), per_scene=120, validation_share=0.0)[0]
+    return generate_questions(scene_files(scenes), per_scene=120, validation_share=0.0)[0]

@@ -15,7 +15,7 @@ from manitwin.scenes.vqa.part_words import ALL_ROUND
 from manitwin.scenes.vqa.question import YES_NO, Question
 from manitwin.scenes.vqa.references import region
 from manitwin.scenes.vqa.templates import FAMILIES
-from manitwin.scenes.vqa.write import ask_scenes
+from manitwin.scenes.vqa.write import generate_questions
 from scene_answers import rederived
 from second_scene import SecondScene, SecondView
 
@@ -99,7 +99,7 @@ def test_heights_are_not_compared_from_right_above(
 
 
 def test_held_out_wordings_are_asked_in_val_only(scenes: Path) -> None:
-    asked, _ = ask_scenes(scene_files(scenes)[:1], per_scene=40, validation_share=1.0)
+    asked, _ = generate_questions(scene_files(scenes)[:1], per_scene=40, validation_share=1.0)
     assert {each.split for each in asked} == {"val"}
     assert all(each.held_out and each.template == len(FAMILIES[each.family].paraphrases) - 1 for each in asked)
 

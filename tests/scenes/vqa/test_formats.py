@@ -16,7 +16,7 @@ from PIL import Image
 
 from manitwin.errors import UsageError
 from manitwin.scenes.vqa.question import Question
-from manitwin.scenes.vqa.wording import worded
+from manitwin.scenes.vqa.wording import word_question
 from manitwin.scenes.vqa.write import write_vqa
 
 PER_SCENE = 30
@@ -104,7 +104,7 @@ def test_points_in_the_convention_of_a_model(questions: list[Question], conventi
     points = [each for each in questions if each.family == "point_at_object"]
     assert points
     for each in points:
-        words = worded(each, convention, 128, 128)
+        words = word_question(each, convention, 128, 128)
         assert re.fullmatch(form, words.response)
         assert words.prompt.startswith(words.question)
         assert len(words.prompt) > len(words.question)

@@ -14,14 +14,14 @@ from manitwin.render.cameras import Camera, look_at
 from manitwin.scenes.layouts.previews import write_previews
 from manitwin.scenes.perception.scene_truth import PICTURES_FOLDER, read_scene_truth
 from manitwin.scenes.scene_files import read_scene, scene_files
-from manitwin.scenes.vqa.detection import is_sure_order
+from manitwin.scenes.vqa.detection import is_order_unambiguous
 from manitwin.scenes.vqa.directions import picture_directions
 from manitwin.scenes.vqa.generate import drafts_of
-from manitwin.scenes.vqa.part_words import is_told
+from manitwin.scenes.vqa.part_words import is_locatable
+from manitwin.scenes.vqa.posed_objects import PosedObject, TwinShape, posed_objects_of
 from manitwin.scenes.vqa.question import Draft
-from manitwin.scenes.vqa.things import Shape, Thing, things_of
 from manitwin.twin.dataset_root import twin_name
-from manitwin.twin.store import RECORD, seal
+from manitwin.twin.store import RECORD, write_twin_record
 from scene_twins import BOWL_HEIGHT_M, BOWL_RADIUS_M
 
 
@@ -32,7 +32,7 @@ def drafts(root: Path, family: str) -> list[Draft]:
         read_scene(file), lambda each: root / "set" / twin_name(each), file.parent / PICTURES_FOLDER, size_px=SIZE_PX
     )
     scene = read_scene_truth(file)
-    found = drafts_of(scene, lambda each: Shape.of_twin(root / "set" / twin_name(each)), ["box", "can"], 0)
+    found = drafts_of(scene, lambda each: TwinShape.of_twin(root / "set" / twin_name(each)), ["box", "can"], 0)
     return [each for each in found if each.family == family]
 
 
@@ -52,7 +52,7 @@ def add_opening(folder: Path) -> None:
         "size_m": BOWL_RADIUS_M, "free": "roll", "source": "geometry",
     }  # fmt: skip
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
 
 
 def test_an_opening_is_in_its_middle_and_not_at_a_place_of_its_rim(tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_an_opening_without_a_frame_is_not_asked_about(tmp_path: Path) -> None:
     record = json.loads((folder / RECORD).read_bytes())
     record["points"]["functional"][0]["frame"] = None
     del record["revision"], record["files"]
-    seal(folder, record)
+    write_twin_record(folder, record)
     asked = drafts(tmp_path, "interaction_point_occluded")
     assert "opening" not in {each.evidence["label"] for each in asked}
 
@@ -92,10 +92,10 @@ def test_the_body_of_what_is_seen_is_never_out_of_sight(tmp_path: Path, name: st
 
 def test_a_box_that_lies_has_no_top_and_no_front(tmp_path: Path) -> None:
     scene = read_scene_truth(_drawn(tmp_path))
-    box = things_of(scene, lambda each: Shape.of_twin(tmp_path / "set" / twin_name(each)))[0]
-    lies = Thing(box.placed_as, box.number, box.shape, box.pose @ transform(np.array(_QUARTER_TURN)), None)
-    assert [is_told(name, box) for name in ("top", "front", "handle")] == [True, False, True]
-    assert [is_told(name, lies) for name in ("top", "front", "handle")] == [False, False, True]
+    box = posed_objects_of(scene, lambda each: TwinShape.of_twin(tmp_path / "set" / twin_name(each)))[0]
+    lies = PosedObject(box.placed_as, box.number, box.shape, box.pose @ transform(np.array(_QUARTER_TURN)), None)
+    assert [is_locatable(name, box) for name in ("top", "front", "handle")] == [True, False, True]
+    assert [is_locatable(name, lies) for name in ("top", "front", "handle")] == [False, False, True]
 
 
 def test_what_is_on_the_surface_is_counted_where_nothing_stands_on_another_thing(tmp_path: Path) -> None:
@@ -111,9 +111,9 @@ def test_what_is_on_the_surface_is_counted_where_nothing_stands_on_another_thing
 
 def test_a_list_has_an_order_where_both_middles_of_things_tell_the_same() -> None:
     hammer, pan, mug = (183.0, 183.5), (222.0, 247.0), (241.0, 241.0)  # mean of the pixels, middle of the box
-    assert is_sure_order(np.array([hammer, pan]), 5) and is_sure_order(np.array([hammer, mug]), 5)
-    assert not is_sure_order(np.array([hammer, pan, mug]), 5)
-    assert not is_sure_order(np.array([mug, (243.0, 243.0)]), 5)
+    assert is_order_unambiguous(np.array([hammer, pan]), 5) and is_order_unambiguous(np.array([hammer, mug]), 5)
+    assert not is_order_unambiguous(np.array([hammer, pan, mug]), 5)
+    assert not is_order_unambiguous(np.array([mug, (243.0, 243.0)]), 5)
 
 
 def test_seen_from_above_nothing_goes_towards_the_camera() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from manitwin.scenes.vqa.functional_planning import _content
 from manitwin.scenes.vqa.nouns import noun_of
-from manitwin.scenes.vqa.references import a_or_an, could_be_asked_for, is_container, one_of, references
+from manitwin.scenes.vqa.references import a_or_an, could_be_asked_for, find_references, is_container, one_of
 
 
 def picture(*things: tuple[str, str | None]) -> Any:
@@ -22,11 +22,11 @@ def picture(*things: tuple[str, str | None]) -> Any:
         )
         for i, (category, color) in enumerate(things)
     ]  # fmt: skip
-    return SimpleNamespace(seen=seen, clear=seen, camera=SimpleNamespace(width_px=512))
+    return SimpleNamespace(seen=seen, clear_objects=seen, camera=SimpleNamespace(width_px=512))
 
 
 def words(*things: tuple[str, str | None]) -> list[str | None]:
-    found = references(picture(*things), random.Random(0))
+    found = find_references(picture(*things), random.Random(0))
     return [found.get(f"object_{i:02d}") for i in range(len(things))]
 
 

@@ -11,7 +11,7 @@ import pytest
 from manitwin.errors import ConfigError
 from manitwin.models.fakes.openai_chat import FakeOpenAi
 from manitwin.models.fakes.server import FakeServer
-from manitwin.scenes.vqa.rephrasing import filled, why_not
+from manitwin.scenes.vqa.rephrasing import fill_slots, rejection_reason
 from manitwin.scenes.vqa.templates import FAMILIES
 from manitwin.scenes.vqa.write import QUESTIONS, REPHRASINGS, write_vqa
 
@@ -40,17 +40,17 @@ OTHER = "{size}By how many centimetres is the space between {a} and {b} wider th
     ],
 )
 def test_a_wording_is_kept_only_with_its_slots_and_its_meaning(family: str, text: str, reason: str | None) -> None:
-    assert why_not(family, text) == reason
+    assert rejection_reason(family, text) == reason
 
 
 def test_no_wording_of_the_own_ones_would_be_refused_but_as_known() -> None:
     for name, family in FAMILIES.items():
-        assert [why_not(name, text) for text in family.paraphrases[:-1]] == ["same_words"] * 3, name
+        assert [rejection_reason(name, text) for text in family.paraphrases[:-1]] == ["same_words"] * 3, name
 
 
 def test_slots_are_filled_with_a_capital_where_a_sentence_begins() -> None:
     slots = {"robot": "The robot looks along +x. ", "a": "the red mug", "A": "The red mug", "cm": "5", "d": "forward"}
-    assert filled("{robot}{a} is slid {cm} cm {d}. {a}?", slots) == (
+    assert fill_slots("{robot}{a} is slid {cm} cm {d}. {a}?", slots) == (
         "The robot looks along +x. The red mug is slid 5 cm forward. The red mug?"
     )
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from manitwin.scenes.vqa.question import BOX, CHOICE, POINT, Draft
-from manitwin.scenes.vqa.scene_understanding import sides_are_apart
+from manitwin.scenes.vqa.scene_understanding import are_sides_unambiguous
 from manitwin.scenes.vqa.selection import _balanced_choices, chosen
-from manitwin.scenes.vqa.sweeps import Meeting, Way
+from manitwin.scenes.vqa.sweeps import ObstacleContact, SweptPath
 
 
 def drafts(family: str, kind: str, count: int) -> list[Draft]:
@@ -29,13 +29,16 @@ def test_a_family_of_which_a_scene_has_few_questions_is_asked_beside_the_common_
 
 
 def test_a_slide_that_misses_or_hits_by_less_than_the_eye_sees_is_not_asked() -> None:
-    def way(near_m: float, touch_m: float) -> Way:
-        return Way({"can": Meeting(near_m, touch_m)}, 1.0)
+    def way(near_m: float, touch_m: float) -> SweptPath:
+        return SweptPath({"can": ObstacleContact(near_m, touch_m)}, 1.0)
 
-    assert way(0.101, np.inf).verdict(0.1) is False and way(0.099, np.inf).verdict(0.1) is None
-    assert way(0.05, 0.079).verdict(0.1) is True and way(0.05, 0.085).verdict(0.1) is None
-    two = {"can": Meeting(0.02, 0.04), "box": Meeting(0.03, 0.055)}
-    assert not Way(two, 1.0).order_is_sure() and Way({**two, "box": Meeting(0.04, 0.061)}, 1.0).order_is_sure()
+    assert way(0.101, np.inf).is_hit_within(0.1) is False and way(0.099, np.inf).is_hit_within(0.1) is None
+    assert way(0.05, 0.079).is_hit_within(0.1) is True and way(0.05, 0.085).is_hit_within(0.1) is None
+    two = {"can": ObstacleContact(0.02, 0.04), "box": ObstacleContact(0.03, 0.055)}
+    assert (
+        not SweptPath(two, 1.0).is_order_certain()
+        and SweptPath({**two, "box": ObstacleContact(0.04, 0.061)}, 1.0).is_order_certain()
+    )
 
 
 @pytest.mark.parametrize(
@@ -44,7 +47,7 @@ def test_a_slide_that_misses_or_hits_by_less_than_the_eye_sees_is_not_asked() ->
 def test_a_side_is_in_doubt_where_one_thing_reaches_over_the_middle_of_the_other(
     one: tuple[float, float], other: tuple[float, float], apart: bool
 ) -> None:
-    assert sides_are_apart(one, other) is apart and sides_are_apart(other, one) is apart
+    assert are_sides_unambiguous(one, other) is apart and are_sides_unambiguous(other, one) is apart
 
 
 def test_choices_that_words_still_tell_are_balanced_again() -> None:

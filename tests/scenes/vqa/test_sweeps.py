@@ -11,21 +11,21 @@ from manitwin.geometry.hull_distance import distance
 from manitwin.geometry.hull_sweep import TOLERANCE_M, first_contacts
 from manitwin.scenes.perception.scene_truth import SceneTruth, read_scene_truth
 from manitwin.scenes.scene_files import scene_files
+from manitwin.scenes.vqa.posed_objects import PosedObject, TwinShape, posed_objects_of
 from manitwin.scenes.vqa.sweeps import LONGEST_M, MARGIN_M, Slide, obstacles_of, sweep
-from manitwin.scenes.vqa.things import Shape, Thing, things_of
 from manitwin.twin.loaded_twin import TwinSource
 
 STEP_M = 0.01
 
 
 @pytest.fixture(scope="module", params=[0, 1])
-def scene(scenes: Path, request: pytest.FixtureRequest) -> tuple[SceneTruth, list[Thing]]:
+def scene(scenes: Path, request: pytest.FixtureRequest) -> tuple[SceneTruth, list[PosedObject]]:
     truth = read_scene_truth(scene_files(scenes)[request.param])
     source = TwinSource(scenes.parent / "set")
-    return truth, things_of(truth, lambda twin_id: Shape.of_twin(source.folder(twin_id)))
+    return truth, posed_objects_of(truth, lambda twin_id: TwinShape.of_twin(source.folder(twin_id)))
 
 
-def slides_of(things: list[Thing]) -> list[Slide]:
+def slides_of(things: list[PosedObject]) -> list[Slide]:
     angles = np.linspace(0, 2 * np.pi, 5, endpoint=False) + 0.1
     return [
         Slide(thing, start, (float(np.cos(angle)), float(np.sin(angle))))
@@ -33,14 +33,14 @@ def slides_of(things: list[Thing]) -> list[Slide]:
     ]  # fmt: skip
 
 
-def test_ways_of_many_slides_are_those_of_each_and_of_all_pairs(scene: tuple[SceneTruth, list[Thing]]) -> None:
+def test_ways_of_many_slides_are_those_of_each_and_of_all_pairs(scene: tuple[SceneTruth, list[PosedObject]]) -> None:
     truth, things = scene
     slides = slides_of(things)
     ways = sweep(slides, things, truth.record)
     met = 0
     for slide, way in zip(slides, ways, strict=True):
         assert sweep([slide], things, truth.record) == [way]
-        parts = slide.thing.placed.parts + slide.moved
+        parts = slide.thing.placed_hulls.parts + slide.start_offset_m
         for name, obstacle in obstacles_of(slide.thing, things, truth.record).items():
             rows, columns = (axis.ravel() for axis in np.indices((len(parts), len(obstacle.parts))))
             units = np.broadcast_to(slide.unit, (len(rows), 3))
@@ -51,7 +51,7 @@ def test_ways_of_many_slides_are_those_of_each_and_of_all_pairs(scene: tuple[Sce
     assert 0 < met < len(slides) * 2
 
 
-def test_what_is_met_is_within_the_margin_there_and_not_before(scene: tuple[SceneTruth, list[Thing]]) -> None:
+def test_what_is_met_is_within_the_margin_there_and_not_before(scene: tuple[SceneTruth, list[PosedObject]]) -> None:
     truth, things = scene
     slides = [slide for slide in slides_of(things) if slide.start_m == (0.0, 0.0)]
     for slide, way in zip(slides, sweep(slides, things, truth.record), strict=True):

@@ -19,7 +19,7 @@ _MOST_FACES = 200_000
 
 
 @dataclass(frozen=True)
-class Balls:
+class BallDrops:
     """The visible opening, with up along +Z, and whether a ball stays inside in each engine.
 
     ``refused`` has the error message of each engine that failed.
@@ -30,16 +30,16 @@ class Balls:
     refused: dict[str, str]
 
 
-def balls(measured: MeasuredAsset) -> Balls:
+def drop_balls(measured: MeasuredAsset) -> BallDrops:
     """Drop a ball into the opening of an asset, if it has one, in each requested engine."""
     visual = measured.visual
     if visual is None or not len(measured.shapes) or len(visual.faces) > _MOST_FACES:
-        return Balls(None, {}, {})
+        return BallDrops(None, {}, {})
     turn = rotation_between(measured.up, np.array([0.0, 0, 1]))
     seen = trimesh.Trimesh(np.asarray(visual.vertices) @ turn.T, visual.faces, process=False)
     opening = find_opening(seen)
     if opening is None or opening.axis[2] < _UPWARD:
-        return Balls(None, {}, {})
+        return BallDrops(None, {}, {})
     kept = [np.asarray(measured.asset.collision[index].vertices, float) @ turn.T for index in measured.shapes.kept]
     inside: dict[str, bool] = {}
     refused: dict[str, str] = {}
@@ -48,7 +48,7 @@ def balls(measured: MeasuredAsset) -> Balls:
             inside[engine] = _ENGINES[engine](kept, opening)
         except (RuntimeError, ValueError, FloatingPointError) as error:
             refused[engine] = " ".join(str(error).split())[:200] or type(error).__name__
-    return Balls(opening, inside, refused)
+    return BallDrops(opening, inside, refused)
 
 
 def _mujoco(hulls: Sequence[np.ndarray], opening: Opening) -> bool:

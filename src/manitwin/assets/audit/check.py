@@ -8,10 +8,10 @@ from pathlib import Path
 from manitwin.assets.asset import Asset
 from manitwin.assets.asset_files import MESHES
 from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.engine_shapes import DRAWN_FORMATS, OF_HULLS, TRIANGLES, with_engine_shapes
 from manitwin.assets.audit.finding import Audited, Finding, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules import RULES_BY_CODE
-from manitwin.assets.audit.taken_by import DRAWN_FORMATS, OF_HULLS, TRIANGLES, as_taken_by
 from manitwin.assets.read import read_asset
 from manitwin.errors import AssetError, TwinError
 from manitwin.twin.store import RECORD, read_record
@@ -40,12 +40,12 @@ def audit_asset(
     engine: str | None = None,
     root: Path | None = None,
 ) -> list[Finding]:
-    """Apply rules, in order, to an asset as an ``engine`` interprets it (``as_taken_by``), and simulate it in ``engines``.
+    """Apply rules, in order, to an asset as an ``engine`` interprets it (``with_engine_shapes``), and simulate it in ``engines``.
 
     If the geometry cannot be measured, only that finding is returned; if a mesh is missing, rules on the shape are skipped.
     Moving parts are read again from the files of the asset, below ``root``.
     """
-    asset = as_taken_by(asset, engine)
+    asset = with_engine_shapes(asset, engine)
     if engine in TRIANGLES:
         rules = [rule for rule in rules if rule.code not in OF_HULLS]
     as_drawn = engine is None and asset.format in DRAWN_FORMATS
@@ -79,24 +79,24 @@ def audit_path(
         findings = audit_asset(asset, rules, engines, engine, root)
         done: list[str] = []
         if fix:
-            done = _mend(asset, findings)
+            done = _apply_fixes(asset, findings)
             if done:
                 asset = read_asset(path, root=root, shape_only=True)
                 findings = audit_asset(asset, rules, engines, engine, root)
     except AssetError as error:
-        return _unread(path, str(error), rules)
+        return _unreadable_result(path, str(error), rules)
     except MemoryError:
-        return _unread(path, f"{path.name}: needs more memory than there is", rules)
+        return _unreadable_result(path, f"{path.name}: needs more memory than there is", rules)
     return Audited(str(path), asset.format, tuple(findings), tuple(done))
 
 
-def _mend(asset: Asset, findings: Sequence[Finding]) -> list[str]:
+def _apply_fixes(asset: Asset, findings: Sequence[Finding]) -> list[str]:
     by_code = dict.fromkeys(RULES_BY_CODE[finding.code].fix for finding in findings)
     done = [fix(asset) for fix in by_code if fix is not None]
     return [said for said in done if not said.startswith("not fixed")]
 
 
-def _unread(path: Path, cause: str, rules: Sequence[Rule]) -> Audited:
+def _unreadable_result(path: Path, cause: str, rules: Sequence[Rule]) -> Audited:
     code = "FIL008" if _is_rejected_twin(path) else "FIL001"
     findings = [
         Finding(rule.code, rule.severity, str(path), " ".join(cause.split()), path)

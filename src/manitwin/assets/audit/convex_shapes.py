@@ -40,7 +40,7 @@ class ConvexShapes:
     corners: tuple[int, ...] = ()
 
     @classmethod
-    def of(cls, shapes: Sequence[np.ndarray]) -> ConvexShapes:
+    def from_vertices(cls, shapes: Sequence[np.ndarray]) -> ConvexShapes:
         """Compute the hulls of shapes, each given by vertices ``(V, 3)`` m."""
         planes, triangles, volumes, interior, boxes = [], [], [], [], []
         flat, kept, corners = [], [], []
@@ -74,7 +74,7 @@ class ConvexShapes:
         return len(self.volumes_m3)
 
     @cached_property
-    def uniform(self) -> UniformSolid:
+    def uniform_solid(self) -> UniformSolid:
         """The union of all shapes with uniform density; overlaps count twice.
 
         Source: second moments of tetrahedra, V/20 (sum of v v^T + s s^T) over the four corners, s their sum.
@@ -102,7 +102,7 @@ class ConvexShapes:
             result[start : start + chunk] = np.maximum.reduceat(beyond, self.starts, axis=0).min(0)
         return result
 
-    def within(self, points: np.ndarray, tolerance_m: float = 0.0) -> np.ndarray:
+    def is_within(self, points: np.ndarray, tolerance_m: float = 0.0) -> np.ndarray:
         """Return which points ``(N, 3)`` lie inside a shape with planes moved outward by ``tolerance_m``, ``(N,) bool``."""
         inside = np.zeros(len(points), dtype=bool)
         ends = np.append(self.starts, len(self.planes))[1:]

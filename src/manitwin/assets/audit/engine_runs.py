@@ -23,7 +23,7 @@ STEP_S = {"mujoco": 1 / 500, "sapien": 1 / 240, "pybullet": 1 / 240}
 
 
 @dataclass(frozen=True)
-class Run:
+class DropRun:
     """One drop: the final pose ``end (4, 4)``, asset to plane, and whether the asset is at rest.
 
     ``refused`` has the error message of the engine if it does not run.
@@ -37,44 +37,44 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Drops:
+class DropRuns:
     """The runs of an asset, from ``start (4, 4)``; ``why_not`` is the reason if there are none."""
 
     body: RigidBody | None
     start: np.ndarray | None
-    runs: tuple[Run, ...] = ()
+    runs: tuple[DropRun, ...] = ()
     why_not: str = ""
 
-    def height_m(self, run: Run) -> float:
+    def height_m(self, run: DropRun) -> float:
         """Return the final height of the centre of mass above the plane."""
         assert self.body is not None and run.end is not None
         return float(transform_points(run.end, self.body.center_of_mass_m[None])[0, 2])
 
-    def lowest_m(self, run: Run) -> float:
+    def lowest_m(self, run: DropRun) -> float:
         """Return the final height of the lowest point of the collision shapes above the plane."""
         assert self.body is not None and run.end is not None
         end = run.end
         return min(float((hull @ end[2, :3]).min()) for hull in self.body.hulls) + float(end[2, 3])
 
 
-def drops(measured: MeasuredAsset) -> Drops:
+def run_drops(measured: MeasuredAsset) -> DropRuns:
     """Drop the asset in each requested engine, with its usual time step and with half of it."""
     body, why_not = _body(measured)
     if body is None:
-        return Drops(None, None, why_not=why_not)
+        return DropRuns(None, None, why_not=why_not)
     turn = rotation_between(measured.up, np.array([0.0, 0, 1]))
     lowest_m = min(float((hull @ turn.T)[:, 2].min()) for hull in body.hulls)
     start = transform(turn, np.array([0, 0, -lowest_m]))
     runs = [run for engine in measured.engines for run in _runs(engine, body, start)]
-    return Drops(body, start, tuple(runs))
+    return DropRuns(body, start, tuple(runs))
 
 
-def _runs(engine: str, body: RigidBody, start: np.ndarray) -> Iterator[Run]:
+def _runs(engine: str, body: RigidBody, start: np.ndarray) -> Iterator[DropRun]:
     for timestep_s in (STEP_S[engine], STEP_S[engine] / 2):
         try:
             yield _ENGINES[engine](body, start, timestep_s)
         except (RuntimeError, ValueError, FloatingPointError, np.linalg.LinAlgError) as error:
-            yield Run(engine, timestep_s, refused=" ".join(str(error).split())[:200] or type(error).__name__)
+            yield DropRun(engine, timestep_s, refused=" ".join(str(error).split())[:200] or type(error).__name__)
             return
 
 
@@ -110,25 +110,25 @@ def _hulls(measured: MeasuredAsset) -> Iterator[np.ndarray]:
             continue
 
 
-def _mujoco(body: RigidBody, start: np.ndarray, timestep_s: float) -> Run:
+def _mujoco(body: RigidBody, start: np.ndarray, timestep_s: float) -> DropRun:
     from manitwin.physics.mujoco.settle import settle_on_plane_in_mujoco
 
     (end,) = settle_on_plane_in_mujoco(body, [start], drop_m=DROP_M, seconds=SECONDS, timestep_s=timestep_s)
-    return Run("mujoco", timestep_s, _finite(end.object_to_plane), end.at_rest)
+    return DropRun("mujoco", timestep_s, _finite(end.object_to_plane), end.at_rest)
 
 
-def _sapien(body: RigidBody, start: np.ndarray, timestep_s: float) -> Run:
+def _sapien(body: RigidBody, start: np.ndarray, timestep_s: float) -> DropRun:
     from manitwin.physics.sapien.settle import settle_on_plane
 
     (end,) = settle_on_plane(body, [start], drop_m=DROP_M, seconds=SECONDS, timestep_s=timestep_s)
-    return Run("sapien", timestep_s, _finite(end.object_to_plane), end.at_rest)
+    return DropRun("sapien", timestep_s, _finite(end.object_to_plane), end.at_rest)
 
 
-def _pybullet(body: RigidBody, start: np.ndarray, timestep_s: float) -> Run:
+def _pybullet(body: RigidBody, start: np.ndarray, timestep_s: float) -> DropRun:
     from manitwin.assets.audit.pybullet_run import drop_in_pybullet
 
     end, at_rest = drop_in_pybullet(body, start, DROP_M, SECONDS, timestep_s)
-    return Run("pybullet", timestep_s, _finite(end), at_rest)
+    return DropRun("pybullet", timestep_s, _finite(end), at_rest)
 
 
 def _finite(pose: np.ndarray) -> np.ndarray:
@@ -137,6 +137,6 @@ def _finite(pose: np.ndarray) -> np.ndarray:
     return pose
 
 
-_ENGINES: dict[str, Callable[[RigidBody, np.ndarray, float], Run]] = {
+_ENGINES: dict[str, Callable[[RigidBody, np.ndarray, float], DropRun]] = {
     "mujoco": _mujoco, "sapien": _sapien, "pybullet": _pybullet
 }  # fmt: skip

@@ -35,7 +35,7 @@ def write_missing_inertial(asset: Asset) -> str:
     if asset.format not in ("urdf", "embodiedgen"):
         return f"not fixed: this is written into URDF files only, this is {asset.format}"
     mass = asset.inertial.mass_kg
-    shapes = ConvexShapes.of([np.asarray(shape.vertices, float) for shape in asset.collision])
+    shapes = ConvexShapes.from_vertices([np.asarray(shape.vertices, float) for shape in asset.collision])
     if mass is None or not mass > 0 or not len(shapes):
         return "not fixed: it needs a mass above zero and collision shapes"
     file = only_file(asset.path) if asset.path.is_dir() else asset.path
@@ -59,7 +59,7 @@ def _complete(inertial: Any, asset: Asset, shapes: ConvexShapes, mass_kg: float)
     Both are written in the axes of the link, which are those of the asset if there is one link.
     """
     done = []
-    solid = shapes.uniform
+    solid = shapes.uniform_solid
     tensor, inertia = asset.inertial.inertia_kg_m2, inertial.find("inertia")
     if inertial.find("origin") is None:
         origin = new_element("origin", xyz=_numbers(solid.center_of_mass_m), rpy="0 0 0")

@@ -29,7 +29,7 @@ class JointRuns:
     refused: str = ""
 
 
-def with_joints_free(measured: MeasuredAsset) -> JointRuns:
+def run_free_joints(measured: MeasuredAsset) -> JointRuns:
     """Release an audited twin in its first placement with free joints."""
     from manitwin.physics.mujoco.articulated import settle_articulated
 
@@ -46,7 +46,9 @@ def with_joints_free(measured: MeasuredAsset) -> JointRuns:
             rest = settle_articulated(body, at, drop_m=DROP_M, seconds=SECONDS, positions=positions)
             low = _lowest_m(body, rest.root_to_plane, rest.positions)
             lowest_m = low if abs(low) > abs(lowest_m) else lowest_m
-            beyond |= dict.fromkeys(_beyond(joint, at) for joint, at in zip(body.joints, rest.positions, strict=True))
+            beyond |= dict.fromkeys(
+                _limit_violation(joint, at) for joint, at in zip(body.joints, rest.positions, strict=True)
+            )
     except (TwinError, ValueError, RuntimeError, np.linalg.LinAlgError) as error:
         return JointRuns(refused=" ".join(str(error).split())[:200] or type(error).__name__)
     return JointRuns(lowest_m, tuple(words for words in beyond if words))
@@ -69,7 +71,7 @@ def _lowest_m(body: ArticulatedBody, root_to_plane: np.ndarray, positions: np.nd
     )
 
 
-def _beyond(joint: ArticulatedJoint, position: float) -> str:
+def _limit_violation(joint: ArticulatedJoint, position: float) -> str:
     """Describe how far a joint is beyond a limit, '' if it is not."""
     way = abs(position - joint.within(position))
     if not np.isfinite(position):

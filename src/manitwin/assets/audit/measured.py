@@ -16,10 +16,10 @@ from scipy.spatial import cKDTree
 from manitwin.assets.asset import Asset
 from manitwin.assets.audit.complaint import Complaint
 from manitwin.assets.audit.convex_shapes import ConvexShapes, UniformSolid, inertia_of_second_moment
-from manitwin.assets.audit.open_air import OpenAir, open_air
+from manitwin.assets.audit.open_air import FreeSpace, sample_free_space
 from manitwin.geometry.distance import closest_points_on_triangles, distance_to_surface
 from manitwin.geometry.sampling import sample_surface
-from manitwin.models.annotators.prior_names import found_by, lookup
+from manitwin.models.annotators.prior_names import find_prior, found_by
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.store import read_record
@@ -60,7 +60,7 @@ class MeasuredAsset:
     root: Path | None = None
     _kept: dict[Callable[..., Any], Any] = field(default_factory=dict)
 
-    def once(self, measure: Callable[[MeasuredAsset], Measure]) -> Measure:
+    def measure_once(self, measure: Callable[[MeasuredAsset], Measure]) -> Measure:
         """Return the measurement of a function on the asset, computed once."""
         if measure not in self._kept:
             self._kept[measure] = measure(self)
@@ -121,12 +121,12 @@ class MeasuredAsset:
     @cached_property
     def hull(self) -> ConvexShapes:
         """The convex hull of the body: one shape, or none if it is flat."""
-        return ConvexShapes.of([] if self.body is None else [np.asarray(self.body.vertices, float)])
+        return ConvexShapes.from_vertices([] if self.body is None else [np.asarray(self.body.vertices, float)])
 
     @cached_property
     def shapes(self) -> ConvexShapes:
         """The convex hulls of the collision shapes."""
-        return ConvexShapes.of([np.asarray(shape.vertices, float) for shape in self.asset.collision])
+        return ConvexShapes.from_vertices([np.asarray(shape.vertices, float) for shape in self.asset.collision])
 
     @cached_property
     def surface(self) -> SurfaceIntegrals | None:
@@ -183,18 +183,18 @@ class MeasuredAsset:
         return min(bound_m, float(np.linalg.norm(closest - point, axis=1).min()))
 
     @cached_property
-    def air(self) -> OpenAir | None:
+    def free_space(self) -> FreeSpace | None:
         """The free space in the bounding box of the visual mesh; None without one."""
         if self.visual is None or not len(self.hull):
             return None
-        return open_air(self.visual, self.up, float(self.hull.volumes_m3.sum()))
+        return sample_free_space(self.visual, self.up, float(self.hull.volumes_m3.sum()))
 
     @cached_property
     def prior(self) -> Prior | None:
         """The prior of the asset's category, or of its name; None if unknown."""
         # the name of a robot, such as Bolt, says nothing about one of its parts
         of_name = None if self.asset.partial else _prior_of_name(self._name_in_words)
-        return lookup(self.asset.category) or of_name
+        return find_prior(self.asset.category) or of_name
 
     @cached_property
     def material_words(self) -> str:

@@ -21,7 +21,7 @@ _LEAST_SHARE_SIDEWAYS = 0.10
 
 
 @dataclass(frozen=True)
-class OpenAir:
+class FreeSpace:
     """Points in an object's bounding box from which at least one axis direction leads outside.
 
     ``points_m (N, 3)``; ``hollow (N,)`` marks those in the largest hollow, which the object closes on all sides but
@@ -33,7 +33,7 @@ class OpenAir:
     opens: np.ndarray | None
 
 
-def open_air(mesh: trimesh.Trimesh, up: np.ndarray, hull_volume_m3: float) -> OpenAir:
+def sample_free_space(mesh: trimesh.Trimesh, up: np.ndarray, hull_volume_m3: float) -> FreeSpace:
     """Cast rays along the six axis directions from random points in a mesh's bounding box; ``up (3,)`` is an axis.
 
     This works on meshes with seams and on walls without thickness. A hollow that only opens downward is ignored, because scans
@@ -57,8 +57,8 @@ def open_air(mesh: trimesh.Trimesh, up: np.ndarray, hull_volume_m3: float) -> Op
         if held >= least and held > share and deep:
             best, share = index, held
     if best is None:
-        return OpenAir(points, np.zeros(len(points), dtype=bool), None)
-    return OpenAir(points, pit & escapes[:, best], _AXES[best])
+        return FreeSpace(points, np.zeros(len(points), dtype=bool), None)
+    return FreeSpace(points, pit & escapes[:, best], _AXES[best])
 
 
 def _is_deep(hollow: np.ndarray, axis: np.ndarray) -> bool:

@@ -13,14 +13,14 @@ from PIL import Image
 
 from manitwin.assets.asset import Asset
 from manitwin.assets.read import read_asset
-from manitwin.assets.within_limits import within_limits
+from manitwin.assets.within_limits import run_within_limits
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.textures import linear_to_srgb, material_of, uv_of
 from manitwin.geometry.poses import rotation_between
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render.cameras import Camera, hero_camera, pixel_rays
 from manitwin.render.false_colors import id_color
-from manitwin.render.raycast import cast_camera, merged
+from manitwin.render.raycast import cast_camera, merge_parts
 
 PANEL_PX = 320
 """The side of each of the two panels."""
@@ -36,7 +36,7 @@ _FIELD_OF_VIEW_DEG = 30.0
 def audited_picture(path: Path, root: Path | None = None) -> bytes | None:
     """Return the picture of the asset at a path, rendered in an isolated process; None if there is nothing to draw."""
     try:
-        picture: bytes | None = within_limits(PICTURE, path, root)
+        picture: bytes | None = run_within_limits(PICTURE, path, root)
     except AssetError:
         return None
     return picture
@@ -90,7 +90,7 @@ def _panel(
     """
     picture = np.full((camera.height_px, camera.width_px, 3), _GROUND_RGB, np.uint8)
     if parts:
-        mesh = merged(list(parts))
+        mesh = merge_parts(list(parts))
         turned = trimesh.Trimesh(np.asarray(mesh.vertices) @ upright.T, mesh.faces, process=False)
         depth_m, normals, face = cast_camera(RayCaster(turned), camera)
         hit = face >= 0
@@ -101,12 +101,12 @@ def _panel(
         if textured:
             origins, directions = pixel_rays(camera)
             points = (origins + directions * depth_m.reshape(-1, 1))[hit.reshape(-1)]
-            _put_on_textures(plain, parts, face[hit], points @ upright)
+            _apply_textures(plain, parts, face[hit], points @ upright)
         picture[hit] = np.rint(plain * shade[:, None]).astype(np.uint8)
     return np.asarray(cv2.resize(picture, (PANEL_PX, PANEL_PX), interpolation=cv2.INTER_AREA))
 
 
-def _put_on_textures(
+def _apply_textures(
     colors: np.ndarray, parts: Sequence[trimesh.Trimesh], faces: np.ndarray, points: np.ndarray
 ) -> None:
     """Set ``colors (N, 3)`` of visible ``points (N, 3)`` to the colours of the parts' textures.

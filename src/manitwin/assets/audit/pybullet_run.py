@@ -40,7 +40,7 @@ def drop_in_pybullet(
         pybullet.setTimeStep(timestep_s, physicsClientId=client)
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
         floor = pybullet.createMultiBody(0, plane, physicsClientId=client)
-        number = _thing(pybullet, client, body, principal_to_object)
+        number = _create_body(pybullet, client, body, principal_to_object)
         # the friction of a contact is the product of both
         pybullet.changeDynamics(floor, -1, lateralFriction=1.0, physicsClientId=client)
         pybullet.changeDynamics(
@@ -71,7 +71,7 @@ def ball_stays_inside_in_pybullet(hulls: Sequence[np.ndarray], opening: Opening)
         pybullet.setGravity(0, 0, -GRAVITY_M_S2, physicsClientId=client)
         pybullet.setTimeStep(_BALL_TIMESTEP_S, physicsClientId=client)
         vessel = pybullet.createMultiBody(
-            0, _shape(pybullet, client, [hull @ drop.turn.T for hull in hulls]), physicsClientId=client
+            0, _create_hulls(pybullet, client, [hull @ drop.turn.T for hull in hulls]), physicsClientId=client
         )
         sphere = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=drop.radius_m, physicsClientId=client)
         ball = pybullet.createMultiBody(BALL_KG, sphere, basePosition=drop.start_m.tolist(), physicsClientId=client)
@@ -93,14 +93,14 @@ def _quiet_import() -> Any:
         return importlib.import_module("pybullet")
 
 
-def _thing(pybullet: Any, client: int, body: RigidBody, principal_to_object: np.ndarray) -> int:
+def _create_body(pybullet: Any, client: int, body: RigidBody, principal_to_object: np.ndarray) -> int:
     """Add a body whose shapes are given in its principal frame."""
     object_to_principal = inverse(principal_to_object)
     hulls = [transform_points(object_to_principal, hull) for hull in body.hulls]
-    return int(pybullet.createMultiBody(body.mass_kg, _shape(pybullet, client, hulls), physicsClientId=client))
+    return int(pybullet.createMultiBody(body.mass_kg, _create_hulls(pybullet, client, hulls), physicsClientId=client))
 
 
-def _shape(pybullet: Any, client: int, hulls: Sequence[np.ndarray]) -> int:
+def _create_hulls(pybullet: Any, client: int, hulls: Sequence[np.ndarray]) -> int:
     """Create a collision shape from hulls: PyBullet builds a hull from each group of an OBJ file."""
     lines, count = [], 0
     for index, hull in enumerate(hulls):

@@ -67,7 +67,7 @@ def digest(audited: Sequence[Audited], rules: Sequence[RuleText]) -> str:
     for rule in sorted(rules, key=lambda rule: (_SEVERITIES.index(rule.severity), -by_rule[rule.code], rule.code)):
         if by_rule[rule.code]:
             lines.append(f"  {by_rule[rule.code]:>6} {rule.severity:<8} {rule.code} {rule.name}")
-    unread = unread_by_cause(audited)
+    unread = unreadable_by_cause(audited)
     if unread:
         lines.append("not read or without geometry, by cause")
         for cause, assets in unread[:_LISTED]:
@@ -81,7 +81,7 @@ def digest(audited: Sequence[Audited], rules: Sequence[RuleText]) -> str:
     return "\n".join(lines)
 
 
-def unread_by_cause(audited: Sequence[Audited]) -> list[tuple[str, list[str]]]:
+def unreadable_by_cause(audited: Sequence[Audited]) -> list[tuple[str, list[str]]]:
     """Return the causes of unreadable or unmeasurable assets with the assets concerned, most frequent first."""
     unread: dict[str, list[str]] = {}
     for each in audited:

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any
 from manitwin.assets.audit.finding import Audited, Finding, RuleText
 from manitwin.assets.read import find_assets
 from manitwin.assets.root import root_of
-from manitwin.assets.within_limits import LIMITS, why_ended
-from manitwin.errors import UsageError, choose_from
-from manitwin.formats.isolated import ProcessCrashed, called, limit_address_space, run_isolated
+from manitwin.assets.within_limits import LIMITS, termination_cause
+from manitwin.errors import UsageError, unknown_name_message
+from manitwin.formats.isolated import ProcessCrashed, call_function, limit_address_space, run_isolated
 
 if TYPE_CHECKING:
     from manitwin.engine.worker_pool import WorkerPool
 
 ENGINES = ("mujoco", "sapien", "pybullet")
 TAKEN_BY = ("mujoco", "pybullet", "sapien", "physx", "gazebo")
-"""Engines whose interpretation of collision shapes can be audited (``taken_by``)."""
+"""Engines whose interpretation of collision shapes can be audited (``with_engine_shapes``)."""
 
 AHEAD = 4
 """Number of assets queued for every process."""
@@ -70,7 +70,7 @@ def check_engines(engines: Iterable[str]) -> tuple[str, ...]:
 def check_engine(engine: str | None) -> str | None:
     """Return the engine whose interpretation of collision shapes is audited; raises UsageError for an unknown one."""
     if engine is not None and engine not in TAKEN_BY:
-        raise UsageError(choose_from("engine", engine, TAKEN_BY))
+        raise UsageError(unknown_name_message("engine", engine, TAKEN_BY))
     return engine
 
 
@@ -96,22 +96,22 @@ def audit_all(
         return
     for path in paths:
         with _one_thread_each():  # another process is started after a crash
-            audited = _audited(path, rules, fix, root_of(path, named), engines, engine)
+            audited = _audit_isolated(path, rules, fix, root_of(path, named), engines, engine)
         yield audited
 
 
-def _audited(
+def _audit_isolated(
     path: Path, rules: Sequence[RuleText], fix: bool, root: Path, engines: Sequence[str], engine: str | None
 ) -> Audited:
     try:
         codes = tuple(rule.code for rule in rules)
         found: Audited = run_isolated(AUDIT, path, codes, fix, root, tuple(engines), engine, limits=LIMITS)
     except (ProcessCrashed, MemoryError) as error:
-        return _unread(path, why_ended(error), rules)
+        return _unreadable_result(path, termination_cause(error), rules)
     return found
 
 
-def _unread(path: Path, cause: str, rules: Sequence[RuleText]) -> Audited:
+def _unreadable_result(path: Path, cause: str, rules: Sequence[RuleText]) -> Audited:
     findings = [
         Finding(rule.code, rule.severity, str(path), f"{path.name}: {cause}", path)
         for rule in rules
@@ -145,20 +145,20 @@ def _in_processes(
     from manitwin.engine.worker_processes import hidden_main_module
 
     with hidden_main_module():
-        pool = WorkerPool(min(jobs, len(paths)), initializer=_begin, initargs=(LIMITS.memory_bytes,))
+        pool = WorkerPool(min(jobs, len(paths)), initializer=_prepare_worker, initargs=(LIMITS.memory_bytes,))
         try:
-            yield from _from_pool(pool, paths, rules, jobs, fix, named, engines, engine)
+            yield from _audit_in_pool(pool, paths, rules, jobs, fix, named, engines, engine)
         finally:
             pool.stop()
 
 
-def _begin(memory_bytes: int) -> None:
+def _prepare_worker(memory_bytes: int) -> None:
     """Prepare a process of the pool, so that imports do not count toward the time limit of an asset."""
     import_module(AUDIT.partition(":")[0])
     limit_address_space(memory_bytes)
 
 
-def _from_pool(
+def _audit_in_pool(
     pool: WorkerPool,
     paths: Sequence[Path],
     rules: Sequence[RuleText],
@@ -172,7 +172,7 @@ def _from_pool(
     waiting: deque[tuple[Path, Any]] = deque()
     for path in paths:
         arguments = (path, codes, fix, root_of(path, named), tuple(engines), engine)
-        waiting.append((path, pool.schedule(called, (AUDIT, arguments), timeout_s=LIMITS.seconds)))
+        waiting.append((path, pool.schedule(call_function, (AUDIT, arguments), timeout_s=LIMITS.seconds)))
         if len(waiting) >= AHEAD * jobs:
             yield _result(pool, *waiting.popleft(), rules)
     while waiting:
@@ -186,7 +186,7 @@ def _result(pool: WorkerPool, path: Path, future: Any, rules: Sequence[RuleText]
         result: Audited = pool.result(future)
         return result
     except (ProcessExpired, TimeoutError, MemoryError) as error:
-        return _unread(path, why_ended(error), rules)
+        return _unreadable_result(path, termination_cause(error), rules)
 
 
 def audit_assets(

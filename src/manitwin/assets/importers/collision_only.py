@@ -10,7 +10,7 @@ from manitwin.formats.meshes.textures import DEFAULT_COLOR, make_part, pbr_mater
 SAID = "nothing of it is seen: its collision shapes were taken for what it looks like, grey"
 
 
-def shown_by_what_collides(asset: Asset) -> Asset:
+def with_collision_as_visual(asset: Asset) -> Asset:
     """Return an asset without visual geometry with grey copies of its collision shapes, and a remark; others unchanged.
 
     PyBullet and MuJoCo draw such bodies this way. Assets with missing meshes or with an articulation also stay unchanged: the

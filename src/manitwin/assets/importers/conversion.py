@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Literal
 
 from manitwin.assets.asset import Asset, Format
-from manitwin.assets.importers.collision_only import shown_by_what_collides
-from manitwin.assets.importers.record import asset_to_object, import_record, shown_parts
+from manitwin.assets.importers.collision_only import with_collision_as_visual
+from manitwin.assets.importers.record import asset_to_object, import_record, visible_parts
 from manitwin.assets.joints import Joints
 from manitwin.assets.read import detect, read_asset
 from manitwin.assets.readers.mjcf import count_objects
 from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.shading_normals import with_normals
 from manitwin.formats.meshes.textures import bake_transform
-from manitwin.formats.meshes.triangles import shaded
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, ImportRecord
 
 MAX_TEXTURE_SIZE = 8192
@@ -26,11 +26,11 @@ def imported_files(asset: Asset) -> tuple[dict[str, bytes], ImportRecord]:
 
     ``asset.glb`` has the visual meshes in metres, Y up as glTF requires. The output is deterministic.
     """
-    asset = shown_by_what_collides(asset)
+    asset = with_collision_as_visual(asset)
     to_object = asset_to_object(asset)
     record = import_record(asset, to_object)
     # boxes and cylinders of a description have sharp edges and no normals that mark them
-    parts = [shaded(bake_transform(part, to_object)) for part in shown_parts(asset)]
+    parts = [with_normals(bake_transform(part, to_object)) for part in visible_parts(asset)]
     # absent fields are not written, so that the bytes equal those of earlier record versions
     unsaid = {name for name in ("articulation", "friction_range") if getattr(record, name) is None}
     text = json.dumps(record.model_dump(mode="json", exclude=unsaid), indent=1, sort_keys=True, allow_nan=False) + "\n"

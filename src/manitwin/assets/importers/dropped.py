@@ -17,7 +17,7 @@ CENTER, INERTIA = "centre of mass", "inertia"
 
 _LEAST_DENSITY_KG_M3 = 0.1  # of the convex hull: a tenth of the density of air
 _CENTER_RULES = (center_of_mass.outside, center_of_mass.left_at_origin)
-_INERTIA_RULES = (inertia.not_positive_definite, inertia.triangle, inertia.placeholder, inertia.magnitude)
+_INERTIA_RULES = (inertia.not_positive_definite, inertia.violates_triangle, inertia.placeholder, inertia.magnitude)
 
 
 def impossible_mass_properties(asset: Asset) -> dict[str, str]:
@@ -37,7 +37,7 @@ def impossible_mass_properties(asset: Asset) -> dict[str, str]:
     return found
 
 
-def inertia_without_a_mass(inertial: Inertial) -> dict[str, str]:
+def inertia_without_mass(inertial: Inertial) -> dict[str, str]:
     """Return why an inertia is dropped if there is no positive mass, in the form of ``impossible_mass_properties``.
 
     PyBullet uses a mass of 0 kg for fixed bodies, whose inertia is then that of a template; without a mass, an inertia cannot
@@ -49,7 +49,7 @@ def inertia_without_a_mass(inertial: Inertial) -> dict[str, str]:
     return {INERTIA: "there is no mass that it is of" if mass_kg is None else f"it is that of {mass_kg:g} kg"}
 
 
-def center_off_what_is_seen(center_m: np.ndarray, points_m: np.ndarray) -> str | None:
+def center_outside_visual(center_m: np.ndarray, points_m: np.ndarray) -> str | None:
     """Return why a centre of mass ``(3,)`` is impossible for the visual points ``(N, 3)``, in metres; None if it is possible.
 
     COM002 tolerates the rounding of collision hulls, but a build refuses a centre outside the solid by more than
@@ -82,7 +82,7 @@ def without_placeholder_mass(asset: Asset) -> tuple[Asset, list[str]]:
     return replace(asset, inertial=Inertial(), articulation=moving), [why]
 
 
-def left_out(asset: Asset) -> list[str]:
+def unused_content(asset: Asset) -> list[str]:
     """Return descriptions of further content of an asset that a build does not use."""
     words = []
     if asset.collision:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from manitwin.assets.importers.telling_name import split_words
+from manitwin.assets.importers.asset_name import split_words
 from manitwin.assets.read import find_assets, is_file_below, robotwin_data
 from manitwin.assets.root import root_of
-from manitwin.assets.within_limits import within_limits
+from manitwin.assets.within_limits import run_within_limits
 from manitwin.errors import AssetError, UsageError
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.plurals import counted
@@ -78,7 +78,7 @@ def import_assets(
         for place in _places(path, format):
             below = root_of(place, [path] if root is None else [root])
             try:
-                free = within_limits(COUNT, place, format, below) if each_object else 0
+                free = run_within_limits(COUNT, place, format, below) if each_object else 0
             except AssetError as error:
                 yield Imported(place, None, None, str(error))
                 continue
@@ -91,7 +91,7 @@ def _import(
 ) -> Imported:
     """Import one asset, or the object ``number`` in it."""
     try:
-        files, record = within_limits(READ, place, format, root, joints, number)
+        files, record = run_within_limits(READ, place, format, root, joints, number)
     except AssetError as error:
         return Imported(place, None, None, str(error))
     folder, there_already = _folder_for(files, out, folder_name(record), record.file)
@@ -100,7 +100,7 @@ def _import(
     return Imported(place, folder, record, there_already=there_already)
 
 
-def kept_words(record: ImportRecord) -> list[str]:
+def kept_properties(record: ImportRecord) -> list[str]:
     """Return descriptions of what an import kept besides the mesh."""
     kept = [] if record.category is None else [record.category]
     kept += [] if record.mass_kg is None else [f"mass {record.mass_kg:.4g} kg"]
@@ -158,12 +158,12 @@ def _folder_for(files: dict[str, bytes], out: Path, name: str, file: str) -> tup
             return folder, False
         if not is_imported(folder):
             raise UsageError(f"{folder}: there already, and no imported asset; give another folder with -o")
-        if all(_holds(folder, file, content) for file, content in files.items()):
+        if all(_has_content(folder, file, content) for file, content in files.items()):
             return folder, True
     raise UsageError(f"{folder}: imported before and changed since; move it away, or give another folder with -o")
 
 
-def _holds(folder: Path, name: str, content: bytes) -> bool:
+def _has_content(folder: Path, name: str, content: bytes) -> bool:
     """Return whether a file in a folder has this content; no more than its length is read."""
     file = folder / name
     if not is_file_below(file, folder) or file.stat().st_size != len(content):

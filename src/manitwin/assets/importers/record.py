@@ -12,17 +12,17 @@ from pydantic import ValidationError
 
 from manitwin.assets.asset import AnnotatedFrame, AnnotatedGrasps, Asset
 from manitwin.assets.asset_files import OUTSIDE
+from manitwin.assets.importers.asset_name import informative_name, split_words
 from manitwin.assets.importers.dropped import (
     CENTER,
     INERTIA,
-    center_off_what_is_seen,
+    center_outside_visual,
     impossible_mass_properties,
-    inertia_without_a_mass,
-    left_out,
+    inertia_without_mass,
+    unused_content,
     without_placeholder_mass,
 )
 from manitwin.assets.importers.links import given_articulation
-from manitwin.assets.importers.telling_name import split_words, telling_name
 from manitwin.assets.root import PACKAGE_MARKS
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import PACKAGE_SCHEMES
@@ -42,21 +42,21 @@ _MOST_ABOVE = 16
 _OFF_M = 1e-3  # above the support plane an object drops by this much; below it, a simulator ejects it
 
 
-def shown_parts(asset: Asset) -> tuple[trimesh.Trimesh, ...]:
+def visible_parts(asset: Asset) -> tuple[trimesh.Trimesh, ...]:
     """Return the visual parts that have faces; raise AssetError if there are none."""
     parts = tuple(part for part in asset.visual if len(part.faces))
     if not parts:
-        raise AssetError(f"{asset.path.name}: no visual mesh to make a twin of{_why(asset)}")
+        raise AssetError(f"{asset.path.name}: no visual mesh to make a twin of{_no_geometry_reason(asset)}")
     return parts
 
 
 def asset_to_object(asset: Asset) -> np.ndarray:
     """Return the rigid transform ``(4, 4)`` from the asset's axes to the object frame of its visual meshes."""
-    return object_frame(_shown_points(asset), _UP_TO_Z[asset.up])
+    return object_frame(_visible_points(asset), _UP_TO_Z[asset.up])
 
 
-def _shown_points(asset: Asset) -> np.ndarray:
-    return np.concatenate([part.vertices[np.unique(part.faces)] for part in shown_parts(asset)])
+def _visible_points(asset: Asset) -> np.ndarray:
+    return np.concatenate([part.vertices[np.unique(part.faces)] for part in visible_parts(asset)])
 
 
 def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
@@ -67,9 +67,9 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
     asset, placeholder = without_placeholder_mass(asset)
     numbers, missing, dropped = _numbers(asset)
     dropped = placeholder + dropped
-    impossible = impossible_mass_properties(asset) | inertia_without_a_mass(asset.inertial)
+    impossible = impossible_mass_properties(asset) | inertia_without_mass(asset.inertial)
     center = None if CENTER in impossible else asset.inertial.center_of_mass_m
-    if center is not None and (why := center_off_what_is_seen(center, _shown_points(asset))) is not None:
+    if center is not None and (why := center_outside_visual(center, _visible_points(asset))) is not None:
         center, impossible[CENTER] = None, why
     dropped += [f"{what}: {why}" for what, why in impossible.items()]
     functional = [_point(frame, to_object) for frame in asset.frames if frame.kind in ("functional", "target")]
@@ -109,7 +109,7 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
         {
             "format": asset.format,
             "file": asset.path.name or asset.path.resolve().name,
-            "name": _words(telling_name(asset.name, asset.path)) or "object",
+            "name": _words(informative_name(asset.name, asset.path)) or "object",
             "category": asset.category or None,
             "license": asset.license,
             "attribution": asset.attribution,
@@ -123,7 +123,7 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
             "grasps": grasps,
             "rests": [rest.tolist() for rest in rests],
             "missing": missing,
-            "dropped": [*dropped, *left_out(asset)],
+            "dropped": [*dropped, *unused_content(asset)],
             "remarks": list(dict.fromkeys(remarks)),
             "articulation": articulation,
             "friction_range": _friction_range(asset, numbers["friction_static"]),
@@ -220,13 +220,13 @@ def _words(name: str) -> str:
     while first < last - 1 and words[first].isdecimal():
         first += 1
     while last > first + 1 and (
-        words[last - 1].isdecimal() or _is_digest(words[last - 1]) or _is_of_a_tool(words[last - 1])
+        words[last - 1].isdecimal() or _is_digest(words[last - 1]) or _is_tool_word(words[last - 1])
     ):
         last -= 1
     return " ".join(words[first:last])
 
 
-def _is_of_a_tool(word: str) -> bool:
+def _is_tool_word(word: str) -> bool:
     return word.lower() in _OF_TOOLS
 
 
@@ -234,7 +234,7 @@ def _is_digest(word: str) -> bool:
     return len(word) >= 8 and set(word) <= _HEXADECIMAL
 
 
-def _why(asset: Asset) -> str:
+def _no_geometry_reason(asset: Asset) -> str:
     lines: Iterator[str] = iter([*(f"{name} is missing" for name in asset.missing_files), *asset.remarks])
     first = next(lines, None)
     elsewhere = next((name for name in asset.missing_files if name.startswith(PACKAGE_SCHEMES)), None)
@@ -242,13 +242,13 @@ def _why(asset: Asset) -> str:
     if elsewhere is None and outside is not None:
         return f" ({outside})"
     if elsewhere is not None:
-        remedy = f"; give the folder that holds {_package(elsewhere)!r} too{_where_a_package_is(asset)}"
+        remedy = f"; give the folder that holds {_package(elsewhere)!r} too{_package_folder_hint(asset)}"
     else:
         remedy = "; put it where its file says" if asset.missing_files else "; give it a shape that is seen or collides"
     return f" ({first}){remedy}" if first else remedy
 
 
-def _where_a_package_is(asset: Asset) -> str:
+def _package_folder_hint(asset: Asset) -> str:
     """Return a phrase naming the closest package folder above an asset, whose folder may be named differently; or ""."""
     folders = itertools.islice(asset.path.resolve().parents, _MOST_ABOVE)
     found = next((folder for folder in folders if any((folder / mark).is_file() for mark in PACKAGE_MARKS)), None)

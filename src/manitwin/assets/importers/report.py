@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from manitwin.assets.importers.importer import Imported, kept_words
+from manitwin.assets.importers.importer import Imported, kept_properties
 from manitwin.formats.installation import installed_version
 
 
@@ -33,7 +33,7 @@ def _entry(each: Imported) -> dict[str, Any]:
         "folder": each.folder.name,
         "imported_before": each.there_already,
         "format": record.format,
-        "kept": kept_words(record),
+        "kept": kept_properties(record),
         "missing": record.missing,
         "dropped": record.dropped,
         "remarks": record.remarks,

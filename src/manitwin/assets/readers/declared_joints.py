@@ -26,7 +26,7 @@ def unit_direction(text: str) -> np.ndarray | None:
     return axis / length if math.isfinite(length) and length > _SHORTEST_AXIS else None
 
 
-def why_no_joint_of_a_twin(name: str, written: str, *, mimics: bool) -> str:
+def unsupported_joint_reason(name: str, written: str, *, mimics: bool) -> str:
     """Return why twins do not support a joint of type ``written``, or one that ``mimics`` another; empty if they do."""
     if written not in JOINT_KINDS:
         return f"{name[:_LONGEST_NAME]!r} is {written}, which twins do not have"
@@ -35,7 +35,7 @@ def why_no_joint_of_a_twin(name: str, written: str, *, mimics: bool) -> str:
     return ""
 
 
-def why_it_cannot_move(name: str, axis: np.ndarray | None, limits: Limits) -> str:
+def immovable_reason(name: str, axis: np.ndarray | None, limits: Limits) -> str:
     """Return why a joint with this axis and these limits cannot move; empty if it can."""
     if axis is not None and limits is not None:
         return ""

@@ -40,8 +40,8 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS)
     category: str | None = None
     captions: tuple[str, ...] = ()
     if info is not None:
-        category = _said(text_of(info, "category"))
-        description = _said(text_of(info, "description"))
+        category = _stated_text(text_of(info, "category"))
+        description = _stated_text(text_of(info, "description"))
         captions = () if description is None else (description,)
         remarks += _ranges(found, info)
         remarks += _height(found, info, asset, "yz".index(up) + 1)
@@ -91,5 +91,5 @@ def _quality(robot: etree._Element) -> list[str]:
     return [f"its {tag.tag} said {(text_of(tag, '.') or 'nothing')[:120]}" for tag in quality.iterchildren(tag="*")]
 
 
-def _said(text: str | None) -> str | None:
+def _stated_text(text: str | None) -> str | None:
     return None if text is None or text.lower() in _UNSAID else text

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import trimesh
 
-from manitwin.assets.articulation import Articulation, AssetLink, Tree
+from manitwin.assets.articulation import Articulation, AssetLink, LinkTree
 from manitwin.assets.asset import Asset, CollisionShape, Contact
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.joints import Joints
@@ -20,9 +20,9 @@ from manitwin.assets.readers.mjcf_contents import COMPUTED, LEFT_OUT_COMPOSITE
 from manitwin.assets.readers.mjcf_document import UNNAMED, MjcfSource, open_mjcf
 from manitwin.assets.readers.mjcf_links import moving_bodies
 from manitwin.assets.readers.mjcf_masses import DeclaredMasses
-from manitwin.assets.readers.mjcf_model import CompiledMjcf, compiled
+from manitwin.assets.readers.mjcf_model import CompiledMjcf, compile_mjcf
 from manitwin.assets.readers.mjcf_shapes import BodyShapes, is_solid
-from manitwin.assets.readers.mjcf_soft import as_shapes_at_rest, soft_parts
+from manitwin.assets.readers.mjcf_soft import rewrite_flexes_at_rest, soft_parts
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshLimits
@@ -58,7 +58,7 @@ def read(
         aside = AssetFiles(files.root, missing=list(files.missing))  # its remarks would concern the whole model
         return {index for index, _ in _rigid_bodies(file, model, aside, joints, number)}
 
-    result = compiled(source, files, chosen)
+    result = compile_mjcf(source, files, chosen)
     if source.soft and not any(is_solid(result.model, body) for body in range(result.model.nbody)):
         return _soft_asset(path, file, AssetFiles(files.root, files.own, files.limits))
     spec, model = result.spec, result.model
@@ -66,11 +66,11 @@ def read(
     moving = moving_bodies(model, bodies, files) if joints == "keep" else None
     ground = not any(is_solid(model, index) for index, _ in bodies)
     shapes = BodyShapes(result, files, planes=ground)
-    visual, collision = shapes.of(bodies)
+    visual, collision = shapes.body_shapes(bodies)
     masses = DeclaredMasses(source, spec, model, files)
     articulation = None
     if moving is not None:
-        visual, collision, articulation = _links_kept(result, bodies, moving, shapes, masses)
+        visual, collision, articulation = _build_articulation(result, bodies, moving, shapes, masses)
         if source.acting:
             acting = ", ".join(sorted(source.acting))
             files.remark(f"what acts on its joints ({acting}) was left out: twins do not have it")
@@ -83,9 +83,9 @@ def read(
         collision=tuple(collision),
         up="z",
         unit_m=1.0,
-        inertial=masses.of(bodies),
+        inertial=masses.inertial(bodies),
         contact=_declared_contact(source, model, shapes, bodies, files),
-        static=ground or _stands_fast(model, bodies[0][0]),  # MuJoCo does not allow a plane to move
+        static=ground or _is_fixed(model, bodies[0][0]),  # MuJoCo does not allow a plane to move
         license=licence,
         attribution=attribution,
         files=files.sorted_files(),
@@ -102,7 +102,7 @@ def count_objects(path: Path, root: Path | None = None) -> int:
     """Return the number of objects with a free joint in an MJCF file; raises AssetError naming what is broken."""
     file = only_file(path) if path.is_dir() else path
     files = AssetFiles(root or root_of(path), file.resolve().parent, MESH_LIMITS)
-    model = compiled(open_mjcf(file, files), files, lambda _: set()).model
+    model = compile_mjcf(open_mjcf(file, files), files, lambda _: set()).model
     shaped = {int(model.body_rootid[body]) for body in range(1, model.nbody) if is_solid(model, body)}
     return sum(_is_free(model, head) for head in shaped)
 
@@ -116,10 +116,10 @@ def _name(result: CompiledMjcf, body: int, file: Path, *, of_mesh: bool) -> str:
     return str(model.body(body).name or mesh_name or (modelname if modelname != UNNAMED else "") or file.stem)
 
 
-def _links_kept(
+def _build_articulation(
     result: CompiledMjcf,
     bodies: list[tuple[int, np.ndarray]],
-    moving: Tree,
+    moving: LinkTree,
     shapes: BodyShapes,
     masses: DeclaredMasses,
 ) -> tuple[tuple[trimesh.Trimesh, ...], tuple[CollisionShape, ...], Articulation]:
@@ -128,9 +128,10 @@ def _links_kept(
         [body for body, of in zip(bodies, moving.link_of, strict=True) if of == link]
         for link in range(len(moving.heads))
     ]
-    shown = [shapes.of(some) for some in by_link]
+    shown = [shapes.body_shapes(some) for some in by_link]
     links = (
-        AssetLink(result.model.body(some[0][0]).name or f"body_{some[0][0]:02d}", masses.of(some)) for some in by_link
+        AssetLink(result.model.body(some[0][0]).name or f"body_{some[0][0]:02d}", masses.inertial(some))
+        for some in by_link
     )
     owners = tuple(link for link, (visual, _) in enumerate(shown) for _ in visual)
     return (
@@ -144,8 +145,8 @@ def _soft_asset(path: Path, file: Path, files: AssetFiles) -> Asset:
     """Return the asset of an MJCF file with only soft bodies: their shapes at rest, in world axes."""
     files.used.add(file.resolve())
     source = open_mjcf(file, files, keep_soft=True)
-    as_shapes_at_rest(source, files)
-    result = compiled(source, files)
+    rewrite_flexes_at_rest(source, files)
+    result = compile_mjcf(source, files)
     parts = tuple(soft_parts(result.model))
     if not parts and not files.missing:
         raise AssetError(
@@ -202,14 +203,16 @@ def _rigid_bodies(
             return next(iter(groups.values()), world)
         if model.ngeom:
             return next((g for g in groups.values() if any(model.body_geomnum[index] for index, _ in g)), world)
-        raise AssetError(f"{file.name}: none of its bodies has a geom{_but(files.remarks)}; give an MJCF file with one")
+        raise AssetError(
+            f"{file.name}: none of its bodies has a geom{_non_rigid_clause(files.remarks)}; give an MJCF file with one"
+        )
     if number is not None:
         free = [group for group in shaped if _is_free(model, group[0][0])]
         if number >= len(free):
             raise AssetError(f"{file.name}: {len(free)} of its objects are free to move; there is no number {number}")
         # the other free objects are requested by their own numbers
         shaped = [free[number], *(group for group in shaped if not _is_free(model, group[0][0]))]
-    files.remark_left_out([_told(model, group) for group in shaped[1:]], "bodies")
+    files.remark_left_out([_group_text(model, group) for group in shaped[1:]], "bodies")
     if joints == "lock":
         inside = {index for index, _ in shaped[0][1:]}  # the joints of the first body move the whole object
         files.remark_locked(
@@ -218,7 +221,7 @@ def _rigid_bodies(
     return shaped[0]
 
 
-def _told(model: Any, group: list[tuple[int, np.ndarray]]) -> str:
+def _group_text(model: Any, group: list[tuple[int, np.ndarray]]) -> str:
     """Return the name of a group of bodies and whether it moves, for a remark."""
     head = group[0][0]
     name = model.body(head).name
@@ -228,7 +231,7 @@ def _told(model: Any, group: list[tuple[int, np.ndarray]]) -> str:
     return f"{what} {'has joints' if any(model.body_jntnum[index] for index, _ in group) else 'is static'}"
 
 
-def _but(remarks: list[str]) -> str:
+def _non_rigid_clause(remarks: list[str]) -> str:
     """Return a clause on what the file has instead of geoms of rigid bodies."""
     if COMPUTED in remarks:
         return ", but those that a plug-in computes: it is code, and none is run"
@@ -237,7 +240,7 @@ def _but(remarks: list[str]) -> str:
     return ""
 
 
-def _stands_fast(model: Any, body: int) -> bool:
+def _is_fixed(model: Any, body: int) -> bool:
     """Return whether a body is fixed: the world itself, or a body without joint that is not the only object of the file.
 
     A single object without a joint counts as movable, because programs add a free joint to it.
@@ -262,7 +265,7 @@ def _declared_contact(
     interval.
     """
     geoms = shapes.colliding(bodies)
-    if not geoms or not source.writes(("friction",)):
+    if not geoms or not source.has_geom_attribute(("friction",)):
         return Contact()
     named = {model.geom(geom).name for geom in geoms} - {""}
     if paired := sum(bool(pair & named) for pair in source.paired):

@@ -40,13 +40,13 @@ def keep_rigid_objects(
     and ``attach`` stay for MuJoCo to expand. ``sizes``: the number of elements of each attached model. Raises AssetError for a
     file that is too large or has numbers that are impossible for an object.
     """
-    if written_out(root, sizes) > _MAX_ELEMENTS:
+    if expanded_size(root, sizes) > _MAX_ELEMENTS:
         raise AssetError(f"{file.name}: more than {_MAX_ELEMENTS} elements; it is no single object")
     soft = root.find(f".//{_FLEX}") is not None
     for tag in (_COMPOSITE,) if keep_soft else (_COMPOSITE, _FLEX):
         for element in list(root.iter(tag)):
             element.getparent().remove(element)
-            files.remark(_left_out(tag))
+            files.remark(_left_out_remark(tag))
     for element in list(root.iter(*_UNSEEN)):
         element.getparent().remove(element)
     for section in list(root):
@@ -63,14 +63,14 @@ def keep_rigid_objects(
     return soft
 
 
-def _left_out(tag: str) -> str:
+def _left_out_remark(tag: str) -> str:
     return f"<{tag}> is no rigid body and was left out"
 
 
-LEFT_OUT_COMPOSITE = _left_out(_COMPOSITE)
+LEFT_OUT_COMPOSITE = _left_out_remark(_COMPOSITE)
 
 
-def written_out(element: etree._Element, sizes: dict[str, float]) -> float:
+def expanded_size(element: etree._Element, sizes: dict[str, float]) -> float:
     """Return the number of elements after expanding every <replicate> and <attach>, given the ``sizes`` of models.
 
     An <attach> of the document itself adds at most all elements counted so far.

@@ -42,32 +42,32 @@ def rewrite_dialects(root: etree._Element, files: AssetFiles) -> None:
     for default in root.iter("default"):
         for key in [key for key in default.attrib if key not in _NOT_OF_DEFAULTS]:
             del default.attrib[key]
-            files.took_leniently(f"<default> has the attribute {key[:40]!r}, which MuJoCo refuses; it was left out")
+            files.remark_leniency(f"<default> has the attribute {key[:40]!r}, which MuJoCo refuses; it was left out")
     _name_top_class(root, files)
-    _take_global_coordinates(root, files)
+    _convert_global_coordinates(root, files)
     for joint in list(root.iter("joint")):
         if joint.get("type") == "fixed":
             joint.getparent().remove(joint)
-            files.took_leniently(
+            files.remark_leniency(
                 "a joint is of the type 'fixed', which MuJoCo refuses; its body was read without a joint"
             )
     for inertial in root.xpath("worldbody/inertial"):  # of a part that a program inserts into a body
         inertial.getparent().remove(inertial)
-        files.took_leniently("the world has an <inertial>, which MuJoCo refuses; it was left out")
+        files.remark_leniency("the world has an <inertial>, which MuJoCo refuses; it was left out")
     for inertial in root.iter("inertial"):
         if inertial.get("fullinertia") is not None and inertial.attrib.pop("quat", None) is not None:
-            files.took_leniently(
+            files.remark_leniency(
                 "an <inertial> has fullinertia and quat, which MuJoCo refuses; quat was left out, as older ones did"
             )
         if inertial.get("pos") is None:
             inertial.set("pos", "0 0 0")
-            files.took_leniently("an <inertial> has no pos, which MuJoCo refuses; it was read as at its body's origin")
+            files.remark_leniency("an <inertial> has no pos, which MuJoCo refuses; it was read as at its body's origin")
     _give_planes_a_size(root, files)
     _leave_out_repeated(root, files)
     _leave_out_unknown(root, files)
 
 
-def leave_out_unknown_to_schema(said: str, roots: Iterable[etree._Element], files: AssetFiles) -> bool:
+def remove_unknown_to_schema(said: str, roots: Iterable[etree._Element], files: AssetFiles) -> bool:
     """Remove the element or attribute that MuJoCo ``said`` is unknown from documents; return whether any was found."""
     attribute, element = _UNKNOWN_ATTRIBUTE.search(said), _UNKNOWN_ELEMENT.search(said)
     tag = attribute.group(2) if attribute else element.group(1) if element else None
@@ -80,7 +80,7 @@ def leave_out_unknown_to_schema(said: str, roots: Iterable[etree._Element], file
         else:
             each.getparent().remove(each)
     what = f"the attribute {attribute.group(1)[:40]!r} of <{tag[:40]}>" if attribute else f"<{tag[:40]}>"
-    files.took_leniently(f"{what} is none of MJCF, which MuJoCo refuses; it was left out")
+    files.remark_leniency(f"{what} is none of MJCF, which MuJoCo refuses; it was left out")
     return bool(found)
 
 
@@ -91,7 +91,7 @@ def _give_planes_a_size(root: etree._Element, files: AssetFiles) -> None:
     for geom in root.iterfind("worldbody//geom[@type='plane']"):
         if geom.get("size") is None:
             geom.set("size", _ENDLESS)
-            files.took_leniently("a plane has no size, which MuJoCo refuses; it was read as one without an end")
+            files.remark_leniency("a plane has no size, which MuJoCo refuses; it was read as one without an end")
 
 
 def _name_top_class(root: etree._Element, files: AssetFiles) -> None:
@@ -100,7 +100,7 @@ def _name_top_class(root: etree._Element, files: AssetFiles) -> None:
     named = [top for top in tops if top.get("class", _MAIN) != _MAIN]
     for top in named:
         name = top.get("class")
-        files.took_leniently(
+        files.remark_leniency(
             f"the top-level <default> is called {name[:60]!r}, which MuJoCo refuses; it was read as older ones do"
         )
         if top is not tops[0]:
@@ -114,7 +114,7 @@ def _name_top_class(root: etree._Element, files: AssetFiles) -> None:
                     element.set(key, _MAIN)
 
 
-def _take_global_coordinates(root: etree._Element, files: AssetFiles) -> None:
+def _convert_global_coordinates(root: etree._Element, files: AssetFiles) -> None:
     """Convert global positions to positions relative to the parent body; files with rotated bodies are left to MuJoCo."""
     compilers = [each for each in root.iterfind("compiler") if each.get("coordinate") == "global"]
     bodies = list(root.iterfind("worldbody//body"))
@@ -122,7 +122,7 @@ def _take_global_coordinates(root: etree._Element, files: AssetFiles) -> None:
         return
     for compiler in compilers:
         del compiler.attrib["coordinate"]
-    files.took_leniently("its coordinates are global, which MuJoCo refuses; they were read as older ones do")
+    files.remark_leniency("its coordinates are global, which MuJoCo refuses; they were read as older ones do")
     places: dict[etree._Element, tuple[float, float, float]] = {}
     for body in bodies:  # a body without a position has that of its parent
         places[body] = _three(body.get("pos"), places.get(body.getparent(), _ORIGIN))
@@ -151,7 +151,7 @@ def _leave_out_repeated(root: etree._Element, files: AssetFiles) -> None:
         key = (entry.tag, entry.get("name"))
         if key in seen:
             entry.getparent().remove(entry)
-            files.took_leniently(
+            files.remark_leniency(
                 f"<{entry.tag}> {entry.get('name')[:60]!r} is written twice, which MuJoCo refuses; the first was read"
             )
         seen.add(key)
@@ -160,7 +160,7 @@ def _leave_out_repeated(root: etree._Element, files: AssetFiles) -> None:
         key = (element.tag, element.get("name"))
         if key in named:
             del element.attrib["name"]
-            files.took_leniently(f"two <{key[0]}> are called {key[1][:60]!r}, which MuJoCo refuses; both were read")
+            files.remark_leniency(f"two <{key[0]}> are called {key[1][:60]!r}, which MuJoCo refuses; both were read")
         named.add(key)
 
 
@@ -171,9 +171,9 @@ def _leave_out_unknown(root: etree._Element, files: AssetFiles) -> None:
         name = element.get("material")
         if element.tag == "geom" and name is not None and name not in materials:
             del element.attrib["material"]
-            files.took_leniently(
+            files.remark_leniency(
                 f"the material {name[:60]!r} is nowhere written, which MuJoCo refuses; its shapes are grey"
             )
         for key in [key for key in _CLASSES if element.get(key, _MAIN) not in classes]:
             name = element.attrib.pop(key)
-            files.took_leniently(f"the class {name[:60]!r} is nowhere written, which MuJoCo refuses; it was left out")
+            files.remark_leniency(f"the class {name[:60]!r} is nowhere written, which MuJoCo refuses; it was left out")

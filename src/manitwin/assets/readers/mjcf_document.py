@@ -13,7 +13,7 @@ import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset_files import AssetFiles
-from manitwin.assets.readers.mjcf_contents import ACTING, keep_rigid_objects, written_out
+from manitwin.assets.readers.mjcf_contents import ACTING, expanded_size, keep_rigid_objects
 from manitwin.errors import AssetError
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.xml_file import MAX_NUMBER, MAX_XML_BYTES, comments_before, read_xml, xml_text
@@ -55,12 +55,12 @@ class MjcfSource:
     keys: list[np.ndarray] = field(default_factory=list)
     total_mass_kg: float | None = None
 
-    def writes(self, attributes: tuple[str, ...]) -> bool:
+    def has_geom_attribute(self, attributes: tuple[str, ...]) -> bool:
         """Return whether a geom, or a default for geoms, has one of these attributes."""
         geoms = [geom for root in (self.root, *self.models.values()) for geom in root.iter("geom")]
         return any(geom.get(name) is not None for geom in geoms for name in attributes)
 
-    def writes_density(self, density_kg_m3: float) -> bool:
+    def has_geom_density(self, density_kg_m3: float) -> bool:
         """Return whether a geom, or a default for geoms, has exactly this density."""
         for root in (self.root, *self.models.values()):
             for geom in root.iter("geom"):
@@ -69,9 +69,9 @@ class MjcfSource:
                         return True
         return False
 
-    def weighs(self) -> bool:
+    def has_mass_data(self) -> bool:
         """Return whether the file writes a mass or density of geoms, or a total mass."""
-        return self.total_mass_kg is not None or self.writes(("mass", "density"))
+        return self.total_mass_kg is not None or self.has_geom_attribute(("mass", "density"))
 
     def model_texts(self) -> dict[str, bytes]:
         """Return the attached XMLs as bytes, and the files of soft bodies."""
@@ -100,7 +100,7 @@ class _Composition:
         """Return the root of one document, with its models read and its files replaced by keys."""
         root = read_xml(file, "mujoco")
         comments = comments_before(root)
-        self._put_in_includes(file, root, file, {file.resolve()})
+        self._inline_includes(file, root, file, {file.resolve()})
         texts = (*comments, *(f"{t.get('name')}: {t.get('data')}" for t in root.iterfind("custom/text")))
         if len(above) == 1:
             self._source.texts += texts
@@ -110,14 +110,14 @@ class _Composition:
             pairs = root.iterfind("contact/pair")
             self._source.paired |= {frozenset((pair.get("geom1") or "", pair.get("geom2") or "")) for pair in pairs}
             self._source.keys += [key for each in root.iterfind("keyframe/key") if (key := _position(each)) is not None]
-        sizes = self._take_models(file, root, above)
+        sizes = self._read_attached_models(file, root, above)
         self._source.acting |= {section.tag for section in root if section.tag in ACTING and len(section)}
         self._source.soft |= keep_rigid_objects(file, root, self._files, sizes, keep_soft=self._keep_soft)
         self._name_files(file, root)
-        self._sizes[str(file.resolve())] = written_out(root, sizes)
+        self._sizes[str(file.resolve())] = expanded_size(root, sizes)
         return root
 
-    def _put_in_includes(self, main: Path, root: etree._Element, file: Path, done: set[Path], depth: int = 0) -> None:
+    def _inline_includes(self, main: Path, root: etree._Element, file: Path, done: set[Path], depth: int = 0) -> None:
         """Replace each <include> by the children of the included root, as MuJoCo does; each file may be included once.
 
         A file is looked up in the folder of the main file, then in that of the including ``file``.
@@ -133,13 +133,13 @@ class _Composition:
             included = read_xml(found, tag)
             for entry in included.xpath("asset/*[@file]"):
                 entry.set(_HOME, str(found.parent))
-            self._put_in_includes(main, included, found, done, depth + 1)
+            self._inline_includes(main, included, found, done, depth + 1)
             parent, position = include.getparent(), include.getparent().index(include)
             parent.remove(include)
             for offset, child in enumerate(list(included)):
                 parent.insert(position + offset, child)
 
-    def _take_models(self, file: Path, root: etree._Element, above: tuple[Path, ...]) -> dict[str, float]:
+    def _read_attached_models(self, file: Path, root: etree._Element, above: tuple[Path, ...]) -> dict[str, float]:
         """Read the models that a document attaches; return their numbers of elements by name."""
         sizes = {}
         for model in root.xpath("asset/model"):

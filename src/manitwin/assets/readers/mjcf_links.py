@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from manitwin.assets.articulation import Node, Tree, rigid_links
+from manitwin.assets.articulation import BodyNode, LinkTree, build_link_tree
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.readers.mjcf_shapes import is_solid
 from manitwin.geometry.articulation import ArticulatedJoint, JointKind
@@ -18,20 +18,22 @@ _KINDS: dict[int, JointKind] = {
 }
 
 
-def moving_bodies(model: Any, bodies: list[tuple[int, np.ndarray]], files: AssetFiles) -> Tree | None:
+def moving_bodies(model: Any, bodies: list[tuple[int, np.ndarray]], files: AssetFiles) -> LinkTree | None:
     """Return the articulation tree of bodies with their poses, parents first; None if no joint is kept.
 
     Joints of the first body move the whole object and are not part of it.
     """
     place_of = {index: place for place, (index, _) in enumerate(bodies)}
-    nodes: list[Node] = []
+    nodes: list[BodyNode] = []
     for index, pose in bodies:
         holder = place_of.get(int(model.body_parentid[index])) if nodes else None
         joint, cause = (None, "") if not nodes else _kept(model, index, pose)
-        nodes.append(Node(model.body(index).name or f"body_{index:02d}", holder, is_solid(model, index), joint, cause))
+        nodes.append(
+            BodyNode(model.body(index).name or f"body_{index:02d}", holder, is_solid(model, index), joint, cause)
+        )
     if not any(node.joint is not None or node.cause for node in nodes):
         return None
-    found = rigid_links(nodes)
+    found = build_link_tree(nodes)
     for remark in found.remarks:
         files.remark(remark)
     if found.joints and _has_springs(model, bodies):

@@ -34,7 +34,7 @@ class DeclaredMasses:
     def __init__(self, source: MjcfSource, spec: Any, model: Any, files: AssetFiles):
         self._source, self._spec, self._model, self._files = source, spec, model, files
 
-    def of(self, bodies: list[tuple[int, np.ndarray]]) -> Inertial:
+    def inertial(self, bodies: list[tuple[int, np.ndarray]]) -> Inertial:
         """Return the mass properties of bodies with poses ``(4, 4)`` in the asset; empty if none are declared."""
         by_index = {body.id: body for body in self._spec.bodies}
         forced = int(self._spec.compiler.inertiafromgeom) == _INERTIA_FROM_GEOM
@@ -42,19 +42,21 @@ class DeclaredMasses:
         explicit = [index for index, _ in bodies if by_index[index].explicitinertial and not forced]
         if explicit and all(index in explicit for index, _ in massive):
             return combined_inertial([self._inertial(index, pose) for index, pose in bodies if index in explicit])
-        if not (explicit or self._source.weighs()) or self._files.lacks_a_mesh:  # the mass of a missing mesh is unknown
+        if (
+            not (explicit or self._source.has_mass_data()) or self._files.has_missing_mesh
+        ):  # the mass of a missing mesh is unknown
             return Inertial()
         if not massive:
             return Inertial(0.0, computed=True)
         total_kg = sum(float(self._model.body_mass[index]) for index, _ in massive)
-        if not explicit and (said := self._said_once(massive)):
+        if not explicit and (said := self._declared_once(massive)):
             mass_kg = sum(each.mass_kg or 0.0 for each in said)
             self._files.remark(
                 f"its mass of {mass_kg:.4g} kg follows from a mass or density written for its geoms; MuJoCo has {total_kg:.4g},"
                 " as it weighs the same place again, by its own density of 1000 kg/m3, for shapes of which the file says none"
             )
             return replace(combined_inertial(said), computed=True, engine_kg=total_kg)
-        unsaid_kg = sum(float(self._unsaid_kg[index]) for index, _ in massive)
+        unsaid_kg = sum(float(self._undeclared_kg[index]) for index, _ in massive)
         if unsaid_kg > _MOST_UNSAID_SHARE * total_kg:
             self._files.remark(
                 f"of {total_kg:.4g} kg the file declares {total_kg - unsaid_kg:.4g}, and MuJoCo's density of 1000 kg/m3 makes the"
@@ -72,32 +74,32 @@ class DeclaredMasses:
         return replace(combined_inertial([self._inertial(index, pose) for index, pose in massive]), computed=True)
 
     @cached_property
-    def _unsaid_kg(self) -> np.ndarray:
+    def _undeclared_kg(self) -> np.ndarray:
         """The mass of each body ``(nbody,)``, kg, that follows from no written mass or density.
 
         It is the mass that bodies lose when geoms with MuJoCo's default density are weightless. A file that writes this very
         density declares it.
         """
-        if self._without_unsaid is None:
+        if self._model_without_undeclared is None:
             return np.zeros(self._model.nbody)
-        kept = self._without_unsaid.body_mass
+        kept = self._model_without_undeclared.body_mass
         return np.asarray(self._model.body_mass - np.where(kept > 2 * LEAST_MASS_KG, kept, 0.0))
 
     @cached_property
-    def _unsaid(self) -> frozenset[int]:
+    def _undeclared_geoms(self) -> frozenset[int]:
         """The geoms for which the file writes neither mass nor density."""
-        if self._source.total_mass_kg is not None or self._source.writes_density(_DENSITY_KG_M3):
+        if self._source.total_mass_kg is not None or self._source.has_geom_density(_DENSITY_KG_M3):
             return frozenset()
         return frozenset(g.id for g in self._spec.geoms if math.isnan(g.mass) and g.density == _DENSITY_KG_M3)
 
     @cached_property
-    def _without_unsaid(self) -> Any:
+    def _model_without_undeclared(self) -> Any:
         """The model in which geoms with MuJoCo's default density are weightless; None if there are no such geoms."""
-        if not self._unsaid:
+        if not self._undeclared_geoms:
             return None
         trial = self._spec.copy()
         for geom in trial.geoms:
-            if geom.id in self._unsaid:
+            if geom.id in self._undeclared_geoms:
                 geom.mass = 0.0
         trial.compiler.boundmass, trial.compiler.boundinertia = LEAST_MASS_KG, LEAST_INERTIA_KG_M2
         try:
@@ -105,16 +107,16 @@ class DeclaredMasses:
         except (ValueError, RuntimeError, mujoco.FatalError) as error:
             raise AssetError(f"{self._source.file.name}: MuJoCo cannot compile it without its own density") from error
 
-    def _said_once(self, bodies: list[tuple[int, np.ndarray]]) -> list[Inertial]:
+    def _declared_once(self, bodies: list[tuple[int, np.ndarray]]) -> list[Inertial]:
         """Return the declared mass properties of bodies whose undeclared shapes only duplicate declared ones.
 
         Such a file gives its collision shapes a density, and does not exclude its visual shapes from the mass. The list is
         empty if a body has undeclared shapes elsewhere, or no body has any.
         """
-        weighed = [index for index, _ in bodies if self._unsaid_kg[index] > 1e-6 * self._model.body_mass[index]]
-        if not weighed or not all(_in_one_place(self._model, index, self._unsaid) for index in weighed):
+        weighed = [index for index, _ in bodies if self._undeclared_kg[index] > 1e-6 * self._model.body_mass[index]]
+        if not weighed or not all(_in_one_place(self._model, index, self._undeclared_geoms) for index in weighed):
             return []
-        return [self._inertial(index, pose, self._without_unsaid) for index, pose in bodies]
+        return [self._inertial(index, pose, self._model_without_undeclared) for index, pose in bodies]
 
     def _inertial(self, index: int, body_to_asset: np.ndarray, model: Any = None) -> Inertial:
         model = self._model if model is None else model

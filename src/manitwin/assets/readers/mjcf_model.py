@@ -12,8 +12,8 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles, joined
-from manitwin.assets.readers.mjcf_dialects import MOST_LEFT_OUT, leave_out_unknown_to_schema
+from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles, concatenate_meshes
+from manitwin.assets.readers.mjcf_dialects import MOST_LEFT_OUT, remove_unknown_to_schema
 from manitwin.assets.readers.mjcf_document import MjcfSource
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
@@ -60,7 +60,9 @@ class MaterialTextures:
     lost: frozenset[str]
 
 
-def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[int]] | None = None) -> CompiledMjcf:
+def compile_mjcf(
+    source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[int]] | None = None
+) -> CompiledMjcf:
     """Compile an MJCF file; geoms of missing meshes are left out.
 
     ``chosen`` returns the indices of the bodies of a model that are needed. Meshes of other bodies are then replaced by
@@ -69,13 +71,13 @@ def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[
     Raises AssetError with MuJoCo's message if it refuses the file.
     """
     name = source.file.name
-    spec = _specified(source, files)
+    spec = _parse_spec(source, files)
     spec.compiler.fusestatic = False  # both options would remove bodies and geoms of the file
     spec.compiler.discardvisual = False
     found = _find_meshes(source, spec, files)
-    paint = _take_textures(source, spec, files)
-    _take_height_fields(source, spec, files)
-    meshes = _take_meshes(spec, found, _wanted(spec, found, chosen), files)
+    paint = _load_textures(source, spec, files)
+    _load_height_fields(source, spec, files)
+    meshes = _load_meshes(spec, found, _wanted(spec, found, chosen), files)
     try:
         try:
             model = spec.compile()
@@ -83,7 +85,7 @@ def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[
             if "mass and inertia of moving bodies" not in str(error):
                 raise
             if not files.missing:  # otherwise its meshes would give it a mass
-                files.took_leniently("a body of it moves and has no mass, which MuJoCo refuses")
+                files.remark_leniency("a body of it moves and has no mass, which MuJoCo refuses")
             spec.compiler.boundmass, spec.compiler.boundinertia = LEAST_MASS_KG, LEAST_INERTIA_KG_M2
             model = spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
@@ -93,13 +95,13 @@ def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[
     return CompiledMjcf(spec, model, meshes, paint)
 
 
-def _specified(source: MjcfSource, files: AssetFiles) -> Any:
+def _parse_spec(source: MjcfSource, files: AssetFiles) -> Any:
     """Return MuJoCo's spec of a document after removing what its schema does not know; raises AssetError with its message."""
     for _ in range(MOST_LEFT_OUT):
         try:
             return mujoco.MjSpec.from_string(xml_text(source.root), include=source.model_texts())
         except (ValueError, RuntimeError, mujoco.FatalError) as error:
-            if not leave_out_unknown_to_schema(str(error), (source.root, *source.models.values()), files):
+            if not remove_unknown_to_schema(str(error), (source.root, *source.models.values()), files):
                 raise AssetError(f"{source.file.name}: MuJoCo cannot read it: {_line(error)}") from error
     raise AssetError(
         f"{source.file.name}: MuJoCo does not know {MOST_LEFT_OUT} of its elements and attributes or more; give a file of MJCF"
@@ -133,7 +135,7 @@ def _wanted(spec: Any, found: dict[str, Path], chosen: Callable[[Any], set[int]]
     trial = spec.copy()
     for mesh in trial.meshes:
         if mesh.name in found:
-            _stand_in(mesh)
+            _set_placeholder(mesh)
     trial.compiler.boundmass, trial.compiler.boundinertia = LEAST_MASS_KG, LEAST_INERTIA_KG_M2
     try:
         bodies = chosen(trial.compile())
@@ -143,22 +145,22 @@ def _wanted(spec: Any, found: dict[str, Path], chosen: Callable[[Any], set[int]]
     return {geom.meshname for index in bodies for geom in holders[index].geoms} & set(found)
 
 
-def _stand_in(mesh: Any) -> None:
+def _set_placeholder(mesh: Any) -> None:
     """Set the geometry of a mesh to a tetrahedron with edges of 0.1 m along the axes."""
     mesh.uservert, mesh.userface = [0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1], [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]
 
 
-def _take_meshes(
+def _load_meshes(
     spec: Any, found: dict[str, Path], wanted: set[str], files: AssetFiles
 ) -> dict[str, list[trimesh.Trimesh]]:
     """Read the needed meshes, pass their vertices to the spec, and return the parts as MuJoCo scales them."""
     meshes: dict[str, list[trimesh.Trimesh]] = {}
     for mesh in [mesh for mesh in spec.meshes if mesh.name in found]:
         if mesh.name not in wanted:
-            _stand_in(mesh)
+            _set_placeholder(mesh)
             continue
         parts = files.mesh(found[mesh.name], hull_of_points=True).parts
-        vertices, faces = joined(parts)
+        vertices, faces = concatenate_meshes(parts)
         mesh.uservert, mesh.userface = vertices.reshape(-1), faces.reshape(-1).astype(np.int32)
         to_asset = np.diag([*mesh.scale, 1.0]) @ _reference(mesh)
         meshes[mesh.name] = [bake_transform(part, to_asset) for part in parts]
@@ -171,7 +173,7 @@ def _reference(mesh: Any) -> np.ndarray:
     return transform(rotation, -rotation @ np.array(mesh.refpos))
 
 
-def _take_textures(source: MjcfSource, spec: Any, files: AssetFiles) -> MaterialTextures:
+def _load_textures(source: MjcfSource, spec: Any, files: AssetFiles) -> MaterialTextures:
     """Read the colour textures of materials and remove all textures from the spec."""
     shown: dict[str, Image.Image | np.ndarray | None] = {}
     means: dict[str, np.ndarray] = {}
@@ -235,7 +237,7 @@ def _mean_color(image: Image.Image, texture: Any) -> np.ndarray:
     return np.asarray(srgb_to_linear(seen).mean(axis=(0, 1)))
 
 
-def _take_height_fields(source: MjcfSource, spec: Any, files: AssetFiles) -> None:
+def _load_height_fields(source: MjcfSource, spec: Any, files: AssetFiles) -> None:
     """Read the pictures of height fields and pass their heights to the spec; those without data are removed with their geoms."""
     for field in list(spec.hfields):
         heights = None
@@ -246,7 +248,7 @@ def _take_height_fields(source: MjcfSource, spec: Any, files: AssetFiles) -> Non
         elif len(field.userdata) == field.nrow * field.ncol:
             heights = np.asarray(field.userdata, float).reshape(field.nrow, field.ncol)
         if heights is not None and min(heights.shape) >= _LEAST_ROWS:
-            files.count(2 * heights.size)
+            files.count_shape(2 * heights.size)
             field.nrow, field.ncol = heights.shape
             field.userdata = heights.reshape(-1).tolist()
             continue

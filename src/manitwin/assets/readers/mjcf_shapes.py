@@ -12,7 +12,7 @@ from trimesh.visual.material import PBRMaterial
 
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
-from manitwin.assets.asset_files import AssetFiles, joined
+from manitwin.assets.asset_files import AssetFiles, concatenate_meshes
 from manitwin.assets.readers.mjcf_model import NO_OBJECTS, CompiledMjcf
 from manitwin.formats.meshes.textures import (
     bake_transform,
@@ -57,7 +57,7 @@ class BodyShapes:
         self._compiled, self._model, self._files, self._planes = compiled, compiled.model, files, planes
         self.areas_m2: dict[int, float] = {}  # of the colliding geoms that were read
 
-    def of(
+    def body_shapes(
         self, bodies: list[tuple[int, np.ndarray]]
     ) -> tuple[tuple[trimesh.Trimesh, ...], tuple[CollisionShape, ...]]:
         """Return the visual parts and the collision shapes of bodies with their poses ``(4, 4)``.
@@ -72,7 +72,7 @@ class BodyShapes:
         for geom, body_to_asset in self._geoms(bodies):
             parts = self._parts(geom, body_to_asset)
             if geom in colliding and parts:
-                vertices, faces = joined(parts)
+                vertices, faces = concatenate_meshes(parts)
                 name = self._model.geom(geom).name or f"geom_{geom:02d}"
                 self.areas_m2[geom] = float(triangles.area(vertices[faces]).sum())
                 primitive = int(self._model.geom_type[geom]) not in _MESH_KINDS
@@ -98,7 +98,7 @@ class BodyShapes:
         material = self._material(geom, pictured=False)
         kind, size = int(model.geom_type[geom]), np.array(model.geom_size[geom])
         if self._planes and kind == int(_KINDS.mjGEOM_PLANE):
-            solid: trimesh.Trimesh | None = _sheet(size)
+            solid: trimesh.Trimesh | None = _plane_sheet(size)
         elif self._planes and kind == int(_KINDS.mjGEOM_HFIELD):
             solid = _terrain(model, int(model.geom_dataid[geom]))
         else:
@@ -106,7 +106,7 @@ class BodyShapes:
         if solid is None:
             self._files.remark(NO_OBJECTS)
             return []
-        self._files.count(len(solid.faces))
+        self._files.count_shape(len(solid.faces))
         name = model.geom(geom).name or f"geom_{geom:02d}"
         return [bake_transform(make_part(solid.vertices, solid.faces, material=material, name=name), pose)]
 
@@ -114,17 +114,17 @@ class BodyShapes:
         model, mesh = self._model, int(self._model.geom_dataid[geom])
         parts = self._compiled.meshes.get(model.mesh(mesh).name)
         if parts is None:  # inline data, in MuJoCo's frame of the mesh inertia
-            vertices, faces = _written_out(model, mesh)
-            self._files.count(len(faces))
+            vertices, faces = _mesh_arrays(model, mesh)
+            self._files.count_shape(len(faces))
             material = self._material(geom, pictured=False)
             return [bake_transform(make_part(vertices, faces, material=material, name=model.mesh(mesh).name), pose)]
-        self._files.count(sum(len(part.faces) for part in parts))
+        self._files.count_shape(sum(len(part.faces) for part in parts))
         inertia_to_mesh = transform(rotation_from_quaternion_wxyz(model.mesh_quat[mesh]), model.mesh_pos[mesh])
         to_asset = pose @ inverse(inertia_to_mesh)
         materials = {
             has_uv: self._material(geom, pictured=has_uv) for has_uv in {uv_of(part) is not None for part in parts}
         }
-        return [bake_transform(_dressed(part, materials[uv_of(part) is not None]), to_asset) for part in parts]
+        return [bake_transform(_with_material(part, materials[uv_of(part) is not None]), to_asset) for part in parts]
 
     def _material(self, geom: int, *, pictured: bool) -> PBRMaterial:
         """Return the material of a geom; unless ``pictured``, its texture is replaced by the mean colour.
@@ -156,7 +156,7 @@ class BodyShapes:
         )
 
 
-def _dressed(part: trimesh.Trimesh, material: PBRMaterial) -> trimesh.Trimesh:
+def _with_material(part: trimesh.Trimesh, material: PBRMaterial) -> trimesh.Trimesh:
     """Return the part with the material of the MJCF file, unless only the mesh file has a texture."""
     own = material_of(part)
     if own.baseColorTexture is not None and material.baseColorTexture is None:
@@ -171,13 +171,13 @@ def _dressed(part: trimesh.Trimesh, material: PBRMaterial) -> trimesh.Trimesh:
     )
 
 
-def _written_out(model: Any, mesh: int) -> tuple[np.ndarray, np.ndarray]:
+def _mesh_arrays(model: Any, mesh: int) -> tuple[np.ndarray, np.ndarray]:
     first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     face, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
     return np.array(model.mesh_vert[first : first + count], float), np.array(model.mesh_face[face : face + faces], int)
 
 
-def _sheet(size: np.ndarray) -> trimesh.Trimesh:
+def _plane_sheet(size: np.ndarray) -> trimesh.Trimesh:
     """Return a sheet below a plane with half lengths ``size``, of which 0 means infinite (MJCF reference, geom type)."""
     sides = [2 * float(half) if half > 0 else _UNBOUNDED_M for half in size[:2]]
     sheet = trimesh.creation.box((*sides, _SHEET_M))

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 from lxml import etree  # type: ignore[import-untyped]
 
-from manitwin.assets.asset_files import AssetFiles, joined
+from manitwin.assets.asset_files import AssetFiles, concatenate_meshes
 from manitwin.assets.readers.mjcf_document import MjcfSource
 from manitwin.errors import AssetError
 from manitwin.formats.bounded_file import read_bytes
@@ -23,7 +23,7 @@ _OF_MOTION = ("dof", "mass", "inertiabox", "origin")
 """Attributes of a flex that concern its motion, or how its interior is divided."""
 
 
-def as_shapes_at_rest(source: MjcfSource, files: AssetFiles) -> None:
+def rewrite_flexes_at_rest(source: MjcfSource, files: AssetFiles) -> None:
     """Rewrite the flexes of a document so that MuJoCo builds their shapes from data, rigidly fixed to their parent bodies.
 
     A Gmsh file is passed to MuJoCo as bytes, a triangle mesh as numbers.
@@ -49,7 +49,7 @@ def _take_file(flex: etree._Element, source: MjcfSource, files: AssetFiles) -> b
         source.soft_files[key] = read_bytes(path, _MAX_GMSH_BYTES, AssetError)
         flex.set("file", key)
         return True
-    vertices, faces = joined(files.mesh(path, hull_of_points=True).parts)
+    vertices, faces = concatenate_meshes(files.mesh(path, hull_of_points=True).parts)
     if len(faces) > _MAX_FILE_FACES:
         files.remark(f"a soft body of {len(faces)} triangles was left out: it is more than is read")
         return False
@@ -71,7 +71,7 @@ def soft_parts(model: Any) -> list[trimesh.Trimesh]:
         first, count = int(model.flex_vertadr[flex]), int(model.flex_vertnum[flex])
         points = np.array(data.flexvert_xpos[first : first + count], float)
         if int(model.flex_dim[flex]) == 1:
-            points, faces = _string(model, flex, points)
+            points, faces = _rod_mesh(model, flex, points)
         else:
             faces = _faces(model, flex)
         red, green, blue = srgb_to_linear(np.clip(np.array(model.flex_rgba[flex][:3], float), 0, 1))
@@ -81,13 +81,15 @@ def soft_parts(model: Any) -> list[trimesh.Trimesh]:
     return parts
 
 
-def _string(model: Any, flex: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _rod_mesh(model: Any, flex: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return vertices and faces of rods along the segments of a one-dimensional flex, with its radius."""
     start, count = int(model.flex_elemdataadr[flex]), 2 * int(model.flex_elemnum[flex])
     pieces = points[np.array(model.flex_elem[start : start + count], int).reshape(-1, 2)]
     radius_m = max(float(model.flex_radius[flex]), _THINNEST_M)
     long = pieces[np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1) > 0]
-    return joined([trimesh.creation.cylinder(radius_m, segment=piece, sections=_ROD_SIDES) for piece in long])
+    return concatenate_meshes(
+        [trimesh.creation.cylinder(radius_m, segment=piece, sections=_ROD_SIDES) for piece in long]
+    )
 
 
 def _faces(model: Any, flex: int) -> np.ndarray:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from manitwin.assets.asset import Asset
 from manitwin.assets.asset_files import AssetFiles
-from manitwin.assets.importers.telling_name import split_words
+from manitwin.assets.importers.asset_name import split_words
 from manitwin.errors import AssetError
 from manitwin.formats.json_file import read_json_object
 

@@ -57,7 +57,7 @@ class RobotwinData:
         given = self.content.get("scale", 1.0)
         numbers = self._numbers("scale", given)
         if numbers.size not in (1, 3):
-            raise self._broken("scale", "is neither a number nor three")
+            raise self._asset_error("scale", "is neither a number nor three")
         return np.broadcast_to(numbers.reshape(-1), 3).copy()
 
     def frames(self) -> tuple[AnnotatedFrame, ...]:
@@ -79,7 +79,7 @@ class RobotwinData:
         """Return numbers of the file as an array; raises AssetError for another shape, or numbers that are not finite."""
         numbers = self._numbers(key, self.content.get(key))
         if numbers.shape != shape:
-            raise self._broken(key, f"has the shape {numbers.shape}, not {shape}")
+            raise self._asset_error(key, f"has the shape {numbers.shape}, not {shape}")
         return numbers
 
     def text(self, key: str) -> str | None:
@@ -97,7 +97,7 @@ class RobotwinData:
         if matrices.shape == (4, 4):
             matrices = matrices[None]  # 1.0 has a single matrix where 2.0 has a list
         if matrices.ndim != 3 or matrices.shape[1:] != (4, 4) or len(matrices) > MAX_FRAMES:
-            raise self._broken(key, f"is no list of 4x4 matrices (shape {matrices.shape})")
+            raise self._asset_error(key, f"is no list of 4x4 matrices (shape {matrices.shape})")
         if (matrices[:, 3] != (0, 0, 0, 1)).any():
             self.remarks.append(f"{key}: a matrix whose last row is not 0 0 0 1")
         matrices = matrices.copy()
@@ -105,7 +105,7 @@ class RobotwinData:
         if key != names[0] and "trans_matrix" in self.content:
             turn = self._numbers("trans_matrix", self.content["trans_matrix"])
             if turn.shape != (4, 4):
-                raise self._broken("trans_matrix", "is no 4x4 matrix")
+                raise self._asset_error("trans_matrix", "is no 4x4 matrix")
             matrices = matrices @ turn  # RoboTwin 1.0: actor @ scaled(contact_pose) @ trans_matrix
         return matrices
 
@@ -127,7 +127,7 @@ class RobotwinData:
         """Return the groups of contacts, without indices of contacts that do not exist."""
         groups = self.content.get("contact_points_group") or []
         if not isinstance(groups, list) or not all(isinstance(group, list) for group in groups):
-            raise self._broken("contact_points_group", "is no list of lists")
+            raise self._asset_error("contact_points_group", "is no list of lists")
         wrong = [i for group in groups for i in group if not isinstance(i, int) or not 0 <= i < count]
         if wrong:
             self.remarks.append(f"contact_points_group: no contact {wrong[0]!r}, there are {count}")
@@ -140,12 +140,12 @@ class RobotwinData:
         try:
             numbers = np.array(value, dtype=float)
         except (TypeError, ValueError, OverflowError) as error:
-            raise self._broken(key, "is not made of numbers") from error
+            raise self._asset_error(key, "is not made of numbers") from error
         if not np.isfinite(numbers).all() or (np.abs(numbers) > LARGEST).any():
-            raise self._broken(key, "holds a number that is not finite, or beyond a million")
+            raise self._asset_error(key, "holds a number that is not finite, or beyond a million")
         return numbers
 
-    def _broken(self, key: str, what: str) -> AssetError:
+    def _asset_error(self, key: str, what: str) -> AssetError:
         return AssetError(f"{self.file.name}: {key} {what}; correct it there")
 
 

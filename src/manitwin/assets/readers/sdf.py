@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
-from manitwin.assets.articulation import Articulation, AssetLink, Tree
+from manitwin.assets.articulation import Articulation, AssetLink, LinkTree
 from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.joints import Joints
@@ -20,7 +20,7 @@ from manitwin.assets.readers.drake_friction import drake_contact
 from manitwin.assets.readers.joint_elements import sdf_joints
 from manitwin.assets.readers.sdf_links import chosen_links
 from manitwin.assets.readers.sdf_shapes import ModelFrames, SdfShapes, pose_of
-from manitwin.assets.readers.upright import Shapes, joined, upright_shapes
+from manitwin.assets.readers.upright import Shapes, concatenate_links, upright_shapes
 from manitwin.assets.readers.urdf_shapes import candidates
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
@@ -46,7 +46,7 @@ class SdfModel:
     links: tuple[etree._Element, ...]
     frames: ModelFrames
     files: AssetFiles
-    moving: Tree | None = None
+    moving: LinkTree | None = None
 
 
 def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, joints: Joints = "part") -> Asset:
@@ -77,13 +77,13 @@ def open_sdf(
         try:
             beside = read_xml(config, "model", inside=config.parent)
         except AssetError as error:
-            files.took_leniently(f"{error}; its name, author and licence were not read")
+            files.remark_leniency(f"{error}; its name, author and licence were not read")
     if beside is not None:
         files.used.add(config.resolve())
     model = _only_model(file, root, files)
     frames = ModelFrames(file, model)
     links, moving = tuple(model.findall("link")), None
-    if not _stands_fast(model):
+    if not _is_static(model):
         links, moving = chosen_links(model, frames, files, joints, root.get("version"))
     return SdfModel(file, root, beside, model, links, frames, files, moving)
 
@@ -128,7 +128,7 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
         return SdfShapes(opened.file, opened.frames, opened.files, turn_gltf=turn).by_link(opened.links)
 
     by_link = upright_shapes(shapes, opened.files)
-    visual, collision, owners = joined(by_link)
+    visual, collision, owners = concatenate_links(by_link)
     if not visual and not collision and not opened.files.missing:
         terrain = any(link.find(".//heightmap") is not None for link in opened.links)
         raise AssetError(
@@ -148,7 +148,7 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
         unit_m=1.0,
         inertial=_declared_inertial(opened, opened.links),
         contact=_declared_contact(opened),
-        static=_stands_fast(opened.model),
+        static=_is_static(opened.model),
         license=licence,
         attribution=attribution,
         files=opened.files.sorted_files(),
@@ -161,7 +161,7 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
     )
 
 
-def _articulation(opened: SdfModel, moving: Tree, owners: list[int]) -> Articulation:
+def _articulation(opened: SdfModel, moving: LinkTree, owners: list[int]) -> Articulation:
     """Return links and joints; ``owners`` are the indices of the links of each visual part, before merging."""
     links = []
     for place, head in enumerate(moving.heads):
@@ -192,17 +192,17 @@ def _only_model(file: Path, root: etree._Element, files: AssetFiles) -> etree._E
     return model
 
 
-def _stands_fast(model: etree._Element) -> bool:
+def _is_static(model: etree._Element) -> bool:
     return (text_of(model, "static") or "").lower() in ("true", "1")
 
 
 def _declared_inertial(opened: SdfModel, links: tuple[etree._Element, ...]) -> Inertial:
-    found = [_of_link(opened, link) for link in links if link.find("inertial") is not None]
+    found = [_link_inertial(opened, link) for link in links if link.find("inertial") is not None]
     with_mass = [entry for entry in found if entry.mass_kg is not None]
     return combined_inertial(with_mass) if with_mass else found[0] if found else Inertial()
 
 
-def _of_link(opened: SdfModel, link: etree._Element) -> Inertial:
+def _link_inertial(opened: SdfModel, link: etree._Element) -> Inertial:
     inertial = link.find("inertial")
     what = f"{opened.file.name}: link {link.get('name')} inertial"
     if (inertial.get("auto") or "").strip().lower() in ("true", "1"):
@@ -216,7 +216,7 @@ def _of_link(opened: SdfModel, link: etree._Element) -> Inertial:
     if inertial.find("inertia") is not None:
         lacks = [key for key in ("ixx", "iyy", "izz") if text_of(inertial, f"inertia/{key}") is None]
         if lacks:
-            opened.files.took_leniently(
+            opened.files.remark_leniency(
                 f"the inertia of link {link.get('name')!r} lacks {', '.join(lacks)}, and was not read"
             )
         else:

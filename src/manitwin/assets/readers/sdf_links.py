@@ -7,15 +7,15 @@ import math
 import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
-from manitwin.assets.articulation import Node, Tree, rigid_links
+from manitwin.assets.articulation import BodyNode, LinkTree, build_link_tree
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.joints import Joints
 from manitwin.assets.readers.declared_joints import (
     JOINT_KINDS,
     Limits,
+    immovable_reason,
     unit_direction,
-    why_it_cannot_move,
-    why_no_joint_of_a_twin,
+    unsupported_joint_reason,
 )
 from manitwin.assets.readers.sdf_shapes import ModelFrames, pose_of
 from manitwin.formats.xml_file import text_of
@@ -32,7 +32,7 @@ Ends = tuple[str, str]
 
 def chosen_links(
     model: etree._Element, frames: ModelFrames, files: AssetFiles, joints: Joints, version: str | None
-) -> tuple[tuple[etree._Element, ...], Tree | None]:
+) -> tuple[tuple[etree._Element, ...], LinkTree | None]:
     """Return the links of the first object with a shape, root of the tree first, and its joint tree for ``joints="keep"``.
 
     With "part", links on fixed joints form one object, and links behind movable joints are others. With "lock" and "keep", all
@@ -43,7 +43,7 @@ def chosen_links(
     held = [(joint, ends) for joint in model.findall("joint") if (ends := _ends(joint, frames)) is not None]
     group = {name: {name} for name in links}
     for joint, ends in held:
-        if _holds(joint, joints) and all(end in links for end in ends) and group[ends[0]] is not group[ends[1]]:
+        if _constrains(joint, joints) and all(end in links for end in ends) and group[ends[0]] is not group[ends[1]]:
             small, large = sorted((group[end] for end in ends), key=len)
             large |= small
             group.update(dict.fromkeys(small, large))
@@ -55,18 +55,20 @@ def chosen_links(
         if chosen is None and shaped:
             chosen = group[name]
         elif chosen is not None and shaped and name not in chosen:
-            how = f"moves by joint {_told(moves[name])}" if name in moves else "is joined to nothing fixed"
+            how = f"moves by joint {_joint_text(moves[name])}" if name in moves else "is joined to nothing fixed"
             left_out.append(f"link {name!r} {how}")
     files.remark_left_out(left_out, "links")
     chosen = chosen or group[next(iter(links))]
     if joints == "lock":
-        files.remark_locked([_told(joint) for name, joint in moves.items() if name in chosen])
+        files.remark_locked([_joint_text(joint) for name, joint in moves.items() if name in chosen])
     kept = tuple(link for name, link in links.items() if name in chosen)
-    within = [(joint, ends) for joint, ends in held if all(end in chosen for end in ends) and _holds(joint, joints)]
+    within = [
+        (joint, ends) for joint, ends in held if all(end in chosen for end in ends) and _constrains(joint, joints)
+    ]
     if joints != "keep" or all(joint.get("type") == "fixed" for joint, _ in within):
         return kept, None
     order, nodes = _tree([str(link.get("name")) for link in kept], links, within, files, frames, version)
-    found = rigid_links(nodes)
+    found = build_link_tree(nodes)
     for remark in found.remarks:
         files.remark(remark)
     return tuple(links[name] for name in order), found if found.joints else None
@@ -79,7 +81,7 @@ def _tree(
     files: AssetFiles,
     frames: ModelFrames,
     version: str | None,
-) -> tuple[list[str], list[Node]]:
+) -> tuple[list[str], list[BodyNode]]:
     """Return the link names, parents first, and a node for each link.
 
     A joint that would attach a link a second time closes a loop, and is left out with a remark. A joint traversed from its
@@ -88,16 +90,16 @@ def _tree(
     children = {ends[1] for _, ends in held}
     root = next((name for name in names if name not in children), names[0])
     order, left = [root], list(held)
-    nodes = [Node(root, None, links[root].find("visual") is not None)]
+    nodes = [BodyNode(root, None, links[root].find("visual") is not None)]
     for name in order:  # grows by the links attached to it
         for joint, ends in [each for each in left if name in each[1]]:
             left.remove((joint, ends))
             other = ends[1] if name == ends[0] else ends[0]
             if other in order:
-                files.remark(f"joint {_told(joint)} closes a loop and was left out")
+                files.remark(f"joint {_joint_text(joint)} closes a loop and was left out")
                 continue
             kept, cause = _kept(joint, ends, frames, version, backward=name == ends[1])
-            nodes.append(Node(other, order.index(name), links[other].find("visual") is not None, kept, cause))
+            nodes.append(BodyNode(other, order.index(name), links[other].find("visual") is not None, kept, cause))
             order.append(other)
     return order, nodes
 
@@ -109,12 +111,12 @@ def _kept(
     written, name = joint.get("type") or "", str(joint.get("name"))
     if written == "fixed":
         return None, ""
-    if cause := why_no_joint_of_a_twin(name, written, mimics=joint.find("axis/mimic") is not None):
+    if cause := unsupported_joint_reason(name, written, mimics=joint.find("axis/mimic") is not None):
         return None, cause
     kind, placed = JOINT_KINDS[written], _pose(joint, ends, frames)
     axis, limits = _axis(joint, placed, frames, version), _limits(joint)
     if axis is None or limits is None:
-        return None, why_it_cannot_move(name, axis, limits)
+        return None, immovable_reason(name, axis, limits)
     lower, upper = limits if kind != "continuous" else (None, None)
     if lower is not None and upper is not None and not lower <= 0 <= upper:
         return None, f"{name[:60]!r} stands outside of its limits"
@@ -192,10 +194,10 @@ def _ends(joint: etree._Element, frames: ModelFrames) -> Ends | None:
     return None if not child else (parent, child)
 
 
-def _holds(joint: etree._Element, joints: Joints) -> bool:
+def _constrains(joint: etree._Element, joints: Joints) -> bool:
     kind = joint.get("type") or ""
     return kind == "fixed" or (joints != "part" and kind != _COUPLES)
 
 
-def _told(joint: etree._Element) -> str:
+def _joint_text(joint: etree._Element) -> str:
     return f"{joint.get('name')} ({joint.get('type') or ''})"

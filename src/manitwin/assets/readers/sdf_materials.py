@@ -44,28 +44,28 @@ Candidates = Callable[[str], Iterator[Path]]
 
 
 @dataclass(frozen=True)
-class ScriptedLook:
+class ScriptedMaterial:
     """A material, and the size of its texture in texture coordinates."""
 
     material: PBRMaterial
     scale: tuple[float, float]
 
     @property
-    def is_picture(self) -> bool:
+    def has_texture(self) -> bool:
         """Whether it has a texture, for which a surface needs texture coordinates."""
         return self.material.baseColorTexture is not None
 
 
-class ScriptedLooks:
+class ScriptedMaterials:
     """Lookup of scripted materials of visuals; missing ones, or ones outside the asset's root, are remarked."""
 
     def __init__(self, files: AssetFiles, candidates: Candidates):
         self._files, self._candidates = files, candidates
-        self._found: dict[tuple[str, ...], ScriptedLook | None] = {}
+        self._found: dict[tuple[str, ...], ScriptedMaterial | None] = {}
         self._scripts: dict[Path, dict[str, OgreMaterial]] = {}
         self._absent: list[str] = []
 
-    def of(self, element: etree._Element) -> ScriptedLook | None:
+    def find_material(self, element: etree._Element) -> ScriptedMaterial | None:
         """Return the material of a visual's material script; None if it names none or the script is missing."""
         script = element.find("material/script")
         if script is None:
@@ -74,7 +74,7 @@ class ScriptedLooks:
         name = text_of(script, "name") or text_of(script, ".") or ""
         key = (name, *uris)
         if key not in self._found:
-            self._found[key] = self._look(name, [uri for uri in uris if uri])
+            self._found[key] = self._find_named(name, [uri for uri in uris if uri])
             if self._found[key] is None:
                 self._absent.append(name or next(iter(uris), ""))
         return self._found[key]
@@ -89,13 +89,13 @@ class ScriptedLooks:
                 f"material scripts are not there, and colours and textures of theirs are missing: {said}"
             )
 
-    def dressed(self, part: trimesh.Trimesh, look: ScriptedLook, shape: str) -> trimesh.Trimesh:
+    def apply_material(self, part: trimesh.Trimesh, look: ScriptedMaterial, shape: str) -> trimesh.Trimesh:
         """Return a part with a scripted material in place of its own, as in Gazebo.
 
         If the part has no texture coordinates, a texture is left out with a remark that names the ``shape``.
         """
         material, uv = look.material, uv_of(part)
-        if uv is None and look.is_picture:
+        if uv is None and look.has_texture:
             self._files.remark(f"{shape} has no texture coordinates: the texture of {material.name!r} is not shown")
             factor = np.asarray(material.baseColorFactor, float) / 255
             material = pbr_material(material.name, base_color=color_of_lost_texture(factor.tolist()))
@@ -108,7 +108,7 @@ class ScriptedLooks:
             normals=normals_of(part),
         )
 
-    def _look(self, name: str, uris: list[str]) -> ScriptedLook | None:
+    def _find_named(self, name: str, uris: list[str]) -> ScriptedMaterial | None:
         folders: list[Path] = []
         said: OgreMaterial | None = None
         for uri in uris:
@@ -122,7 +122,7 @@ class ScriptedLooks:
             owner, _, own = name.partition("/")
             color = _OF_GAZEBO.get(own) if owner == "Gazebo" else None
             said = None if color is None else OgreMaterial(diffuse=(*color, 1.0))
-        return None if said is None else ScriptedLook(self._material(name, said, folders), said.scale)
+        return None if said is None else ScriptedMaterial(self._material(name, said, folders), said.scale)
 
     def _is_below(self, place: Path) -> bool:
         try:

@@ -12,9 +12,9 @@ from lxml import etree  # type: ignore[import-untyped]
 from scipy.spatial.transform import Rotation
 
 from manitwin.assets.asset import CollisionShape
-from manitwin.assets.asset_files import AssetFiles, joined
-from manitwin.assets.primitives import unwrapped
-from manitwin.assets.readers.sdf_materials import ScriptedLooks
+from manitwin.assets.asset_files import AssetFiles, concatenate_meshes
+from manitwin.assets.primitives import unwrap_primitive
+from manitwin.assets.readers.sdf_materials import ScriptedMaterials
 from manitwin.assets.readers.sdf_solids import primitive_of, prism_of
 from manitwin.assets.readers.sdf_terrain import terrain
 from manitwin.assets.readers.upright import Y_UP_FORMATS
@@ -105,7 +105,7 @@ class SdfShapes:
 
     def __init__(self, file: Path, frames: ModelFrames, files: AssetFiles, *, turn_gltf: bool = False):
         self._file, self._frames, self._files, self._turn_gltf = file, frames, files, turn_gltf
-        self._looks = ScriptedLooks(files, self._candidates)
+        self._looks = ScriptedMaterials(files, self._candidates)
         self._nodes: dict[Path, dict[str, frozenset[str]]] = {}
 
     def by_link(self, links: Iterable[etree._Element]) -> list[tuple[list[trimesh.Trimesh], list[CollisionShape]]]:
@@ -133,7 +133,7 @@ class SdfShapes:
                 drawn = element.find("geometry/heightmap") is not None
                 primitive = element.find("geometry/mesh") is None and not drawn
                 path = self._mesh_path(element)
-                yield CollisionShape(name, *joined(parts), not drawn, path, primitive, as_drawn=drawn)
+                yield CollisionShape(name, *concatenate_meshes(parts), not drawn, path, primitive, as_drawn=drawn)
 
     def _elements(self, link: etree._Element, tag: str) -> Iterator[tuple[etree._Element, str]]:
         for element in link.findall(tag):
@@ -150,14 +150,14 @@ class SdfShapes:
         shapes = [] if geometry is None else list(geometry.iterchildren(tag="*"))
         if len(shapes) != 1 and {shape.tag for shape in shapes} != {"polyline"}:
             raise AssetError(f"{what}: its <geometry> holds {len(shapes)} shapes, not one")
-        look = self._looks.of(element)
-        parts = self._undressed(element, shapes, what, textured=look is not None and look.is_picture)
+        look = self._looks.find_material(element)
+        parts = self._parts_without_script(element, shapes, what, textured=look is not None and look.has_texture)
         if look is None:
             return parts
         called = (text_of(shapes[0], "uri") or shapes[0].tag).rpartition("/")[2]
-        return [self._looks.dressed(part, look, called) for part in parts]
+        return [self._looks.apply_material(part, look, called) for part in parts]
 
-    def _undressed(
+    def _parts_without_script(
         self, element: etree._Element, shapes: list[etree._Element], what: str, *, textured: bool
     ) -> list[trimesh.Trimesh]:
         shape, color = shapes[0], _diffuse(element, what)
@@ -180,17 +180,17 @@ class SdfShapes:
     def _solid(
         self, solid: trimesh.Trimesh, shape: etree._Element, color: np.ndarray | None, textured: bool
     ) -> trimesh.Trimesh:
-        self._files.count(len(solid.faces))
+        self._files.count_shape(len(solid.faces))
         name, material = str(shape.tag), plain_material(color)
         if not textured:
             return make_part(solid.vertices, solid.faces, material=material, name=name)
-        vertices, faces, uv = unwrapped(solid, name)
+        vertices, faces, uv = unwrap_primitive(solid, name)
         return make_part(vertices, faces, material=material, name=name, uv=uv)
 
     def _mesh_parts(self, shape: etree._Element, color: np.ndarray | None, what: str) -> list[trimesh.Trimesh]:
         uri = text_of(shape, "uri") or ""
         path = self._files.find(uri, self._candidates(uri))
-        if path is None or self._files.is_of_unread_format(path):
+        if path is None or self._files.is_unsupported(path):
             return []
         scale = text_of(shape, "scale")
         whole = self._files.mesh(path)
@@ -231,7 +231,7 @@ class SdfShapes:
 
     def _mesh_path(self, element: etree._Element) -> Path | None:
         uri = text_of(element, "geometry/mesh/uri")
-        return None if uri is None else self._files.used_one(uri, self._candidates(uri))
+        return None if uri is None else self._files.find_used(uri, self._candidates(uri))
 
 
 def _diffuse(element: etree._Element, what: str) -> np.ndarray | None:

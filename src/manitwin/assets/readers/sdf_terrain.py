@@ -41,7 +41,7 @@ def terrain(shape: etree._Element, path: Path, files: AssetFiles, what: str) -> 
         files.remark(f"of its heights every {step}th was read")
         heights = heights[::step, ::step]
     rows, columns = heights.shape
-    files.count(2 * rows * columns)
+    files.count_shape(2 * rows * columns)
     x, y = np.meshgrid(np.linspace(-0.5, 0.5, columns), np.linspace(-0.5, 0.5, rows))
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1)
     lower = np.column_stack([corner, corner + 1, corner + columns + 1])

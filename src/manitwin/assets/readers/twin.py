@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.assets.asset import AnnotatedFrame, AnnotatedGrasps, Asset, CollisionShape, Contact, Inertial
-from manitwin.assets.asset_files import MESH_LIMITS, joined
+from manitwin.assets.asset_files import MESH_LIMITS, concatenate_meshes
 from manitwin.assets.joints import DeclaredJoint
 from manitwin.errors import AssetError, InputError, TwinError
 from manitwin.formats.glb import read_glb
@@ -82,7 +82,7 @@ def _hulls(folder: Path) -> tuple[CollisionShape, ...]:
     shapes = []
     for file in sorted((folder / "collision").glob("hull_*.obj")):
         try:
-            vertices, faces = joined(read_obj(MeshSource(file, MESH_LIMITS)))
+            vertices, faces = concatenate_meshes(read_obj(MeshSource(file, MESH_LIMITS)))
         except InputError as error:
             raise AssetError(error.detail) from error
         shapes.append(CollisionShape(file.stem, vertices, faces, convex=True, file=file))

@@ -27,20 +27,20 @@ def upright_shapes(read: Callable[[bool], list[Shapes]], files: AssetFiles) -> l
     if not any(file.suffix.lower().lstrip(".") in Y_UP_FORMATS for file in files.used):
         return as_written
     turned = read(True)
-    if sum(_apart_m(*link) for link in turned) > sum(_apart_m(*link) for link in as_written) + _SAME_M:
+    if sum(_box_distance_m(*link) for link in turned) > sum(_box_distance_m(*link) for link in as_written) + _SAME_M:
         return as_written
     files.remark("its glTF meshes were turned from Y up to Z up, as Drake and Gazebo do and SAPIEN does not")
     return turned
 
 
-def joined(by_link: list[Shapes]) -> tuple[list[trimesh.Trimesh], list[CollisionShape], list[int]]:
+def concatenate_links(by_link: list[Shapes]) -> tuple[list[trimesh.Trimesh], list[CollisionShape], list[int]]:
     """Concatenate the visual parts and the collision shapes of all links; also return the link index of each visual part."""
     visual = [part for parts, _ in by_link for part in parts]
     collision = [shape for _, shapes in by_link for shape in shapes]
     return visual, collision, [number for number, (parts, _) in enumerate(by_link) for _ in parts]
 
 
-def _apart_m(visual: list[trimesh.Trimesh], collision: list[CollisionShape]) -> float:
+def _box_distance_m(visual: list[trimesh.Trimesh], collision: list[CollisionShape]) -> float:
     """Return the largest distance (m) between sides of the visual and the collision box; 0 if either is empty."""
     seen = [np.asarray(part.vertices) for part in visual if len(part.vertices)]
     felt = [shape.vertices for shape in collision if len(shape.vertices)]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
-from manitwin.assets.articulation import Articulation, AssetLink, Tree
+from manitwin.assets.articulation import Articulation, AssetLink, LinkTree
 from manitwin.assets.asset import Asset, CollisionShape, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.filled_hulls import filled_hulls
@@ -20,7 +20,7 @@ from manitwin.assets.read import only_file
 from manitwin.assets.readers.drake_friction import drake_contact
 from manitwin.assets.readers.joint_elements import urdf_joints
 from manitwin.assets.readers.partnet_mobility import with_category
-from manitwin.assets.readers.upright import Shapes, joined, upright_shapes
+from manitwin.assets.readers.upright import Shapes, concatenate_links, upright_shapes
 from manitwin.assets.readers.urdf_links import Placed, chosen_links
 from manitwin.assets.readers.urdf_shapes import LinkShapes
 from manitwin.assets.root import root_of
@@ -56,7 +56,7 @@ class UrdfObject:
     tree: UrdfTree
     links: tuple[Placed, ...]
     files: AssetFiles
-    moving: Tree | None = None
+    moving: LinkTree | None = None
 
 
 def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, joints: Joints = "part") -> Asset:
@@ -77,16 +77,16 @@ def open_urdf(
     """Parse a URDF and select the object in it; raises AssetError."""
     file = only_file(path) if path.is_dir() else path
     files = AssetFiles(root or root_of(path), file.resolve().parent, limits)
-    tree = read_urdf(file, RULES, file.name, partial(_as_loaders_take_it, files=files, name=file.name))
+    tree = read_urdf(file, RULES, file.name, partial(_rewrite_leniently, files=files, name=file.name))
     files.used.add(file.resolve())
     links, moving = chosen_links(tree, files, joints)
     return UrdfObject(file, tree, links, files, moving)
 
 
-def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> None:
+def _rewrite_leniently(root: etree._Element, files: AssetFiles, name: str) -> None:
     """Rewrite a URDF as lenient loaders read it: without extensions of other tools, and with links that only joints name."""
-    _leave_its_namespace(root)
-    _give_each_joint_its_name(root, files)
+    _remove_namespace(root)
+    _number_repeated_joints(root, files)
     for soft in root.findall(_SOFT):
         said = f"<{_SOFT}> {(soft.get('name') or '')[:60]!r} is PyBullet's for what bends: it is no rigid body"
         if root.find("link") is None:
@@ -94,7 +94,7 @@ def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> N
                 f"{name}: its only body, {said}, and only rigid ones are read from URDF; give a URDF with a <link>"
             )
         files.remark(f"{said} and was left out")
-    _leave_out_pybullets_shapes(root, files)
+    _remove_pybullet_shapes(root, files)
     for geometry in root.iter("geometry"):
         for foreign in [child for child in geometry.iterchildren("*") if etree.QName(child).namespace]:
             geometry.remove(foreign)
@@ -102,33 +102,33 @@ def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> N
         misplaced = others if first is not None and first.tag in RULES.geometries else []
         for other in misplaced:
             geometry.remove(other)
-            files.took_leniently(f"a <geometry> holds <{str(other.tag)[:40]}> beside its shape, which was left out")
+            files.remark_leniency(f"a <geometry> holds <{str(other.tag)[:40]}> beside its shape, which was left out")
     for mesh in root.iter("mesh"):
         factors = (mesh.get("scale") or "").replace(",", " ").split()
         if len(factors) > _AXES:
             mesh.set("scale", " ".join(factors[:_AXES]))
-            files.took_leniently(f"a mesh has {len(factors)} factors of scale, of which the first three were taken")
+            files.remark_leniency(f"a mesh has {len(factors)} factors of scale, of which the first three were taken")
     for color in root.iter("color"):
         numbers = (color.get("rgba") or "").replace(",", " ").split()
         if len(numbers) > _RGBA:  # urdfdom drops such a colour, and no loader refuses the file
             color.set("rgba", " ".join(numbers[:_RGBA]))
-            files.took_leniently(f"a colour has {len(numbers)} numbers, of which the first four were taken")
+            files.remark_leniency(f"a colour has {len(numbers)} numbers, of which the first four were taken")
     for element in root.iter("origin", "color", "box", "mesh"):
         for key in _TRIPLES.intersection(element.attrib):  # "0.1, 0, 0.2" is read as three numbers
             element.set(key, element.get(key).replace(",", " "))
     _add_absent_parents(root, files)
 
 
-def _leave_out_pybullets_shapes(root: etree._Element, files: AssetFiles) -> None:
+def _remove_pybullet_shapes(root: etree._Element, files: AssetFiles) -> None:
     """Remove collision shapes that only PyBullet supports: an infinite plane, and a distance field in a file."""
     for collision in [*root.iter("collision")]:
         shapes = [shape for name in _OF_PYBULLET for shape in collision.iterfind(f"geometry/{name}")]
         if shapes:
             collision.getparent().remove(collision)
-            files.took_leniently(f"a <collision> is <{shapes[0].tag}>, which PyBullet alone knows, and was left out")
+            files.remark_leniency(f"a <collision> is <{shapes[0].tag}>, which PyBullet alone knows, and was left out")
 
 
-def _leave_its_namespace(root: etree._Element) -> None:
+def _remove_namespace(root: etree._Element) -> None:
     """Remove the namespace of the whole document from its elements; Drake's descriptions have one, and loaders ignore it."""
     namespace = etree.QName(root).namespace
     for element in root.iter(etree.Element) if namespace else ():
@@ -137,7 +137,7 @@ def _leave_its_namespace(root: etree._Element) -> None:
             element.tag = name.localname
 
 
-def _give_each_joint_its_name(root: etree._Element, files: AssetFiles) -> None:
+def _number_repeated_joints(root: etree._Element, files: AssetFiles) -> None:
     """Number joints of the same name: PyBullet and MuJoCo programs identify them by index, while urdfdom refuses them."""
     seen: set[str] = set()
     for joint in root.findall("joint"):
@@ -145,7 +145,7 @@ def _give_each_joint_its_name(root: etree._Element, files: AssetFiles) -> None:
         if name in seen:
             number = next(n for n in itertools.count(2) if f"{name}_{n}" not in seen)
             joint.set("name", f"{name}_{number}")
-            files.took_leniently(f"two joints are called {name[:60]!r}, which urdfdom refuses; both were read")
+            files.remark_leniency(f"two joints are called {name[:60]!r}, which urdfdom refuses; both were read")
         seen.add(joint.get("name") or "")
 
 
@@ -155,7 +155,7 @@ def _add_absent_parents(root: etree._Element, files: AssetFiles) -> None:
     for name in [name for name in parents if links and name and name not in links]:
         root.insert(0, etree.Element("link", name=name))
         if name != _WORLD:
-            files.took_leniently(
+            files.remark_leniency(
                 f"a joint hangs from the link {name[:60]!r}, which is nowhere; it was read as one without a shape"
             )
 
@@ -165,12 +165,12 @@ def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> A
 
     def shapes(turn: bool) -> list[Shapes]:
         read = LinkShapes(found.tree, found.file, found.files, turn_gltf=turn)
-        return [read.all([link]) for link in found.links]
+        return [read.shapes([link]) for link in found.links]
 
     by_link = upright_shapes(shapes, found.files)
-    visual, collision, owners = joined(by_link)
+    visual, collision, owners = concatenate_links(by_link)
     if not visual and not collision and not found.files.missing:
-        raise found.tree.refuse("", "no link of it has a shape", "give it a visual or a collision shape")
+        raise found.tree.make_error("", "no link of it has a shape", "give it a visual or a collision shape")
     licence, attribution = stated_licence(comments_before(found.tree.element))
     return Asset(
         format="urdf",
@@ -194,7 +194,7 @@ def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> A
     )
 
 
-def _articulation(found: UrdfObject, moving: Tree, owners: list[int]) -> Articulation:
+def _articulation(found: UrdfObject, moving: LinkTree, owners: list[int]) -> Articulation:
     """Return links and joints; ``owners`` are the indices of the links of each visual part, before merging."""
     links = []
     for place, head in enumerate(moving.heads):

@@ -7,15 +7,15 @@ import math
 import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
-from manitwin.assets.articulation import Node, Tree, rigid_links
+from manitwin.assets.articulation import BodyNode, LinkTree, build_link_tree
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.joints import Joints
 from manitwin.assets.readers.declared_joints import (
     JOINT_KINDS,
     Limits,
+    immovable_reason,
     unit_direction,
-    why_it_cannot_move,
-    why_no_joint_of_a_twin,
+    unsupported_joint_reason,
 )
 from manitwin.geometry.articulation import ArticulatedJoint
 from manitwin.robots.urdf import UrdfTree, child_of, origin_of, parent_of
@@ -27,7 +27,7 @@ _AXIS = np.array([1.0, 0, 0])
 """The default axis of the URDF specification."""
 
 
-def chosen_links(tree: UrdfTree, files: AssetFiles, joints: Joints) -> tuple[tuple[Placed, ...], Tree | None]:
+def chosen_links(tree: UrdfTree, files: AssetFiles, joints: Joints) -> tuple[tuple[Placed, ...], LinkTree | None]:
     """Return the links of the first object with a shape, with their poses, and its joint tree for ``joints="keep"``.
 
     With "part", links on fixed joints form one object, and links behind movable joints are others. With "lock", all links are
@@ -46,7 +46,7 @@ def chosen_links(tree: UrdfTree, files: AssetFiles, joints: Joints) -> tuple[tup
             for child in children[name]:
                 kind = held[child].get("type")
                 if kind == "fixed" or (joints != "part" and kind not in _LET_GO):
-                    group.append((child, pose @ _placed(held[child], joints)))
+                    group.append((child, pose @ _child_to_parent(held[child], joints)))
                 else:
                     heads.append(child)
         groups.append(group)
@@ -68,7 +68,7 @@ def chosen_links(tree: UrdfTree, files: AssetFiles, joints: Joints) -> tuple[tup
         files.remark_locked([joint.get("name") for joint in moving if parent_of(joint) in inside])
     if joints != "keep" or not moving:
         return placed, None
-    found = rigid_links(_nodes(chosen, links, held))
+    found = build_link_tree(_nodes(chosen, links, held))
     for remark in found.remarks:
         files.remark(remark)
     return placed, found if found.joints else None
@@ -76,13 +76,13 @@ def chosen_links(tree: UrdfTree, files: AssetFiles, joints: Joints) -> tuple[tup
 
 def _nodes(
     chosen: list[tuple[str, np.ndarray]], links: dict[str, etree._Element], held: dict[str, etree._Element]
-) -> list[Node]:
+) -> list[BodyNode]:
     place_of = {name: place for place, (name, _) in enumerate(chosen)}
     seen = {name: links[name].find("visual") is not None for name in place_of}
-    nodes = [Node(chosen[0][0], None, seen[chosen[0][0]])]
+    nodes = [BodyNode(chosen[0][0], None, seen[chosen[0][0]])]
     for name, pose in chosen[1:]:
         joint, cause = _kept(held[name], pose)
-        nodes.append(Node(name, place_of[parent_of(held[name])], seen[name], joint, cause))
+        nodes.append(BodyNode(name, place_of[parent_of(held[name])], seen[name], joint, cause))
     return nodes
 
 
@@ -91,11 +91,11 @@ def _kept(joint: etree._Element, child_to_asset: np.ndarray) -> tuple[Articulate
     written, name = joint.get("type") or "", str(joint.get("name"))
     if written == "fixed":
         return None, ""
-    if cause := why_no_joint_of_a_twin(name, written, mimics=joint.find("mimic") is not None):
+    if cause := unsupported_joint_reason(name, written, mimics=joint.find("mimic") is not None):
         return None, cause
     kind, axis, limits = JOINT_KINDS[written], _axis(joint), _limits(joint)
     if axis is None or limits is None:
-        return None, why_it_cannot_move(name, axis, limits)
+        return None, immovable_reason(name, axis, limits)
     lower, upper = limits
     if kind == "revolute" and lower is None:
         kind = "continuous"
@@ -109,7 +109,7 @@ def _kept(joint: etree._Element, child_to_asset: np.ndarray) -> tuple[Articulate
             axis=child_to_asset[:3, :3] @ axis,
             lower=None if kind == "continuous" else lower,
             upper=None if kind == "continuous" else upper,
-            stands_at=_standing(joint),
+            stands_at=_position_near_zero(joint),
             damping=max(0.0, _number(joint.find("dynamics"), "damping") or 0.0),
             friction=max(0.0, _number(joint.find("dynamics"), "friction") or 0.0),
             effort=_positive(joint.find("limit"), "effort"),
@@ -119,18 +119,18 @@ def _kept(joint: etree._Element, child_to_asset: np.ndarray) -> tuple[Articulate
     )
 
 
-def _placed(joint: etree._Element, joints: Joints) -> np.ndarray:
+def _child_to_parent(joint: etree._Element, joints: Joints) -> np.ndarray:
     """Return the pose ``(4, 4)`` of a joint's child in its parent."""
     origin = origin_of(joint)
     kind, axis = JOINT_KINDS.get(joint.get("type") or ""), _axis(joint)
-    position = _standing(joint) if joints == "keep" else 0.0
+    position = _position_near_zero(joint) if joints == "keep" else 0.0
     if position == 0.0 or kind is None or axis is None:
         return origin
     moved = ArticulatedJoint("", kind, 0, 0, np.zeros(3), axis).motion(position)
     return origin @ moved
 
 
-def _standing(joint: etree._Element) -> float:
+def _position_near_zero(joint: etree._Element) -> float:
     """Return the position within a joint's limits that is closest to 0."""
     limits = _limits(joint)
     if joint.get("type") == "continuous" or limits is None or limits[0] is None or limits[1] is None:

@@ -13,7 +13,7 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
-from manitwin.assets.asset_files import AssetFiles, joined
+from manitwin.assets.asset_files import AssetFiles, concatenate_meshes
 from manitwin.assets.obj_groups import obj_groups
 from manitwin.assets.readers.upright import Y_UP_FORMATS
 from manitwin.assets.root import upward
@@ -41,7 +41,7 @@ class LinkShapes:
         materials = [*tree.element.findall("material"), *tree.element.iterfind("link/visual/material")]
         self._colors = {each.get("name"): color for each in materials if (color := _rgba(each)) is not None}
 
-    def all(
+    def shapes(
         self, links: Iterable[tuple[etree._Element, np.ndarray]]
     ) -> tuple[list[trimesh.Trimesh], list[CollisionShape]]:
         """Return the visual parts and the collision shapes of links with their poses ``(4, 4)``."""
@@ -73,7 +73,7 @@ class LinkShapes:
             where = f"link {link.get('name')!r} collision {index}"
             parts = [bake_transform(part, to_asset) for part in self._parts(element, where, None)]
             if parts:
-                vertices, faces = joined(parts)
+                vertices, faces = concatenate_meshes(parts)
                 name = element.get("name") or f"{link.get('name')}_{index:02d}"
                 file = self._mesh_file(element)
                 primitive = geometry_of(element).tag != "mesh"
@@ -91,13 +91,13 @@ class LinkShapes:
                 self._files.remark(f"{where} has no size (<{shape.tag} {key}={shape.get(key)!r}>) and was left out")
                 return []
         solid = _primitive(shape)
-        self._files.count(len(solid.faces))
+        self._files.count_shape(len(solid.faces))
         return [make_part(solid.vertices, solid.faces, material=plain_material(color), name=str(shape.tag))]
 
     def _mesh_parts(self, shape: etree._Element, color: np.ndarray | None) -> list[trimesh.Trimesh]:
         name = shape.get("filename") or ""
         path = self._files.find(name, self._candidates(name))
-        if path is None or self._files.is_of_unread_format(path):
+        if path is None or self._files.is_unsupported(path):
             return []
         # RViz and Gazebo Classic disagree; ROS takes meshes along the axes of the link
         note = "it was not turned, as ROS does not"
@@ -115,7 +115,7 @@ class LinkShapes:
         if shape is None:
             return None
         name = shape.get("filename") or ""
-        return self._files.used_one(name, self._candidates(name))
+        return self._files.find_used(name, self._candidates(name))
 
     def _color(self, element: etree._Element) -> np.ndarray | None:
         material = element.find("material")

@@ -9,29 +9,29 @@ from typing import Any
 
 from pxr import Tf, Usd, UsdGeom, UsdPhysics
 
-from manitwin.assets.articulation import Articulation, AssetLink, Tree
+from manitwin.assets.articulation import Articulation, AssetLink, LinkTree
 from manitwin.assets.asset import Asset, Inertial, combined_inertial
 from manitwin.assets.asset_files import MESH_LIMITS
 from manitwin.assets.joints import Joints
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
 from manitwin.assets.readers.usd_layers import LayerFiles
-from manitwin.assets.readers.usd_links import Chosen, chosen_bodies
+from manitwin.assets.readers.usd_links import StageSelection, select_bodies
 from manitwin.assets.readers.usd_masses import (
     StageUnits,
+    complete_from_hulls,
     declared_contact,
     declared_inertial,
     is_rigid_body,
-    of_its_hulls,
 )
 from manitwin.assets.readers.usd_shapes import Felt, LayeredSurfaces, Seen, StageShapes, check_prims
 from manitwin.assets.root import root_of
-from manitwin.assets.within_limits import LIMITS, why_ended
+from manitwin.assets.within_limits import LIMITS, termination_cause
 from manitwin.errors import AssetError, InputError
-from manitwin.formats.isolated import ProcessCrashed, TookTooLong, run_isolated
+from manitwin.formats.isolated import ProcessCrashed, ProcessTimeout, run_isolated
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
-from manitwin.formats.meshes.usd_errors import broken
-from manitwin.formats.meshes.usd_places import PlacedPrim, placed_prims
+from manitwin.formats.meshes.usd_errors import broken_usd_cause
+from manitwin.formats.meshes.usd_placed_prims import PlacedPrim, placed_prims
 from manitwin.formats.meshes.usd_skin import Skeletons
 
 
@@ -45,8 +45,8 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS,
     function = "manitwin.assets.readers.usd:read_here"
     try:
         asset: Asset = run_isolated(function, path.absolute(), root or root_of(path), limits, joints, limits=LIMITS)
-    except (TookTooLong, MemoryError) as error:
-        raise AssetError(f"{path}: {why_ended(error)}") from error
+    except (ProcessTimeout, MemoryError) as error:
+        raise AssetError(f"{path}: {termination_cause(error)}") from error
     except ProcessCrashed as error:
         raise AssetError(f"{path}: its USD is so broken that the USD library crashes on it; export it again") from error
     return asset
@@ -62,7 +62,7 @@ def read_here(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LI
     except InputError as error:
         raise AssetError(error.detail) from error
     except Tf.ErrorException as error:
-        raise AssetError(f"{file}: {broken(error)}; mend it there, or export it again") from error
+        raise AssetError(f"{file}: {broken_usd_cause(error)}; mend it there, or export it again") from error
     except UnicodeDecodeError as error:
         raise AssetError(f"{file}: a text in it is not UTF-8; export it again") from error
 
@@ -70,15 +70,15 @@ def read_here(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LI
 def _asset(path: Path, stage: Usd.Stage, layers: LayerFiles, joints: Joints, source: MeshSource) -> Asset:
     file, units, placed = source.path, StageUnits.of(stage, source), placed_prims(stage, source)
     check_prims(placed, source)
-    chosen = chosen_bodies(stage, placed, units, joints, source)
+    chosen = select_bodies(stage, placed, units, joints, source)
     shapes = StageShapes(chosen.placed, units.m, LayeredSurfaces(layers, source), Skeletons(stage, source), source)
     seen, felt = shapes.visual(), shapes.collision()
     if not seen and not felt:
-        raise AssetError(f"{file}: no prim of it has a shape{_but(layers)}")
+        raise AssetError(f"{file}: no prim of it has a shape{_empty_stage_clause(layers)}")
     root = stage.GetDefaultPrim()
     if not root:
-        source.find("it has no default prim: nothing can reference it without a path")
-    said = _said(stage, root)
+        source.add_finding("it has no default prim: nothing can reference it without a path")
+    said = _custom_texts(stage, root)
     licence, attribution = stated_licence(_texts(stage, root))
     named = said.get("license") or said.get("licence") or licence
     inertial, articulation = declared_inertial(chosen.placed, felt, units, source), None
@@ -109,7 +109,12 @@ def _asset(path: Path, stage: Usd.Stage, layers: LayerFiles, joints: Joints, sou
 
 
 def _articulation(
-    chosen: Chosen, moving: Tree, seen: Sequence[Seen], felt: Sequence[Felt], units: StageUnits, source: MeshSource
+    chosen: StageSelection,
+    moving: LinkTree,
+    seen: Sequence[Seen],
+    felt: Sequence[Felt],
+    units: StageUnits,
+    source: MeshSource,
 ) -> tuple[Inertial, Articulation]:
     """Return the inertial of the whole, unknown if that of a body is unknown, and its links and joints."""
     solid = {chosen.node_of(placed) for _, placed in (*seen, *felt)}
@@ -122,7 +127,7 @@ def _articulation(
     for shape in felt:
         felt_of[chosen.node_of(shape[1])].append(shape)
     weighed = [
-        of_its_hulls(declared_inertial(prims, shapes, units, source), shapes)
+        complete_from_hulls(declared_inertial(prims, shapes, units, source), shapes)
         for prims, shapes in zip(of_node, felt_of, strict=True)
     ]
     links = []
@@ -131,29 +136,29 @@ def _articulation(
         bodies = [weighed[node] for node in mine if felt_of[node] or weighed[node].mass_kg is not None]
         # static prims without visible shapes do not form a body of the file
         named = head if chosen.bodies[head] is not None else next(node for node in mine if chosen.nodes[node].shaped)
-        links.append(AssetLink(chosen.nodes[named].name, _together(bodies)))
+        links.append(AssetLink(chosen.nodes[named].name, _combine_bodies(bodies)))
     unweighed = [link.name for link in links if link.inertial.mass_kg is None]
     if unweighed and len(unweighed) < len(links):
-        source.find(f"link {unweighed[0]!r} declares no mass: that of all of it is not known")
+        source.add_finding(f"link {unweighed[0]!r} declares no mass: that of all of it is not known")
     owners = tuple(moving.link_of[chosen.node_of(placed)] for _, placed in seen)
-    return _together([link.inertial for link in links]), Articulation(tuple(links), moving.joints, owners)
+    return _combine_bodies([link.inertial for link in links]), Articulation(tuple(links), moving.joints, owners)
 
 
-def _together(bodies: list[Inertial]) -> Inertial:
+def _combine_bodies(bodies: list[Inertial]) -> Inertial:
     """Combine bodies into one inertial; empty if the mass of one is unknown."""
     if not bodies or any(body.mass_kg is None for body in bodies):
         return Inertial()
     return replace(combined_inertial(bodies), computed=any(body.computed for body in bodies))
 
 
-def _but(layers: LayerFiles) -> str:
+def _empty_stage_clause(layers: LayerFiles) -> str:
     """Return a clause on what the stage has instead of shapes."""
     if layers.missing:
         return f", and layers that it names are not there: {', '.join(sorted(layers.missing)[:3])}"
     return "; it may be a layer of another asset"
 
 
-def _said(stage: Usd.Stage, root: Usd.Prim) -> dict[str, str]:
+def _custom_texts(stage: Usd.Stage, root: Usd.Prim) -> dict[str, str]:
     """Return the texts in the custom data of the root layer and default prim, and one level below; the prim has priority."""
     found: dict[str, str] = {}
     for data in (stage.GetRootLayer().customLayerData, root.GetCustomData() if root else {}):
@@ -169,14 +174,14 @@ def _texts(stage: Usd.Stage, root: Usd.Prim) -> Iterator[str]:
         yield root.GetDocumentation() or ""
 
 
-def _remark_bodies(chosen: Chosen, source: MeshSource) -> None:
+def _remark_bodies(chosen: StageSelection, source: MeshSource) -> None:
     prims = {each.prim.GetPath(): each.prim for each in chosen.placed}.values()
     rigid = [prim for prim in prims if is_rigid_body(prim)]
     if not rigid:
-        source.find("no prim of it is a rigid body")
+        source.add_finding("no prim of it is a rigid body")
     if len(rigid) > 1 and chosen.moving is None:
-        source.find(f"its {len(rigid)} rigid bodies were taken as one")
+        source.add_finding(f"its {len(rigid)} rigid bodies were taken as one")
     if any(UsdPhysics.RigidBodyAPI(prim).GetKinematicEnabledAttr().Get() for prim in rigid):
-        source.find("its rigid body is kinematic: it moves only where it is moved")
+        source.add_finding("its rigid body is kinematic: it moves only where it is moved")
     if chosen.whole and any(joint.kind != "fixed" for joint in chosen.joints):
-        source.find("it has joints, which were left out")
+        source.add_finding("it has joints, which were left out")

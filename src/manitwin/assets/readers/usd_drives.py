@@ -69,7 +69,7 @@ def drive_of(prim: Usd.Prim, axis: str, units: StageUnits, source: MeshSource, *
     fastest = said("physxJoint:maxJointVelocity") or said("newton:velocityLimit")
     effort = effort or said("urdf:limit:effort")
     if motor or any(said(name) is not None for name in _NOT_OF_TWINS):
-        source.find("motors, springs and armatures of its joints were left out: twins do not have them")
+        source.add_finding("motors, springs and armatures of its joints were left out: twins do not have them")
     return Drive(
         damping or 0.0,
         rubs or (0.0 if resists is None else resists * force),

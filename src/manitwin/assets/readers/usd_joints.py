@@ -12,7 +12,7 @@ from pxr import Sdf, Usd, UsdPhysics
 from manitwin.assets.joints import DeclaredJoint
 from manitwin.assets.readers.usd_masses import StageUnits, body_of
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.usd_places import PlacedPrim
+from manitwin.formats.meshes.usd_placed_prims import PlacedPrim
 
 _KINDS = (
     (UsdPhysics.RevoluteJoint, "revolute"),
@@ -52,11 +52,11 @@ class StageJoint:
         return name_of(self.prim)
 
     @property
-    def holds(self) -> bool:
+    def is_constraint(self) -> bool:
         """Whether it constrains its bodies to each other; a distance joint, such as a rope, does not."""
         return self.kind != "distance"
 
-    def told(self) -> str:
+    def label(self) -> str:
         """Return its name and kind for a remark."""
         return f"{self.name[:NAME]} ({self.kind})"
 
@@ -76,14 +76,14 @@ def stage_joints(
             continue
         told = f"joint {each.prim.GetName()[:NAME]!r}"
         if each.copy:
-            source.find(f"{told} is repeated by a point instancer and was left out")
+            source.add_finding(f"{told} is repeated by a point instancer and was left out")
             continue
         if UsdPhysics.Joint(each.prim).GetJointEnabledAttr().Get() is False:
-            source.find(f"{told} is turned off (jointEnabled) and was left out")
+            source.add_finding(f"{told} is turned off (jointEnabled) and was left out")
             continue
         joint = _joint(each.prim, of_path)
         if isinstance(joint, str):
-            source.find(f"{told} {joint} and was left out")
+            source.add_finding(f"{told} {joint} and was left out")
         else:
             found.append(joint)
     return found
@@ -106,12 +106,12 @@ def _joint(prim: Usd.Prim, of_path: Mapping[Sdf.Path, PlacedPrim]) -> StageJoint
         ends.append(None if body is None else body.GetPath())
     if ends[0] == ends[1]:
         return "has both its ends on one thing" if ends[0] is not None else "joins no rigid body"
-    kind, axis, lower, upper = _way(prim)
+    kind, axis, lower, upper = _motion_of(prim)
     extra = bool(api.GetExcludeFromArticulationAttr().Get())
     return StageJoint(prim, kind, (named[0], named[1]), (ends[0], ends[1]), axis, lower, upper, extra)
 
 
-def _way(prim: Usd.Prim) -> tuple[str, str, float, float]:
+def _motion_of(prim: Usd.Prim) -> tuple[str, str, float, float]:
     """Return the kind of a joint, its axis, and its limits as written."""
     for schema, kind in _KINDS:
         if not prim.IsA(schema):

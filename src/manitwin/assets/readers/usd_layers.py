@@ -15,9 +15,9 @@ from manitwin.assets.readers.usd_mtlx import SUFFIX, mtlx_layer
 from manitwin.errors import AssetError
 from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.usd_errors import broken
+from manitwin.formats.meshes.usd_errors import broken_usd_cause
 from manitwin.formats.meshes.usdz_package import UsdzArchive, package_path
-from manitwin.formats.sniff import told_of_no_file_itself
+from manitwin.formats.sniff import placeholder_description
 
 _LAYERS = (".usd", ".usda", ".usdc", ".usdz", SUFFIX)
 _MAX_LAYERS = 1_000
@@ -57,7 +57,7 @@ class LayerFiles:
 
     def compose(self) -> Usd.Stage:
         """Return the stage. Raises AssetError and InputError ``unreadable``, and Tf.ErrorException for broken USD."""
-        if told := _told_of_no_layer(self._folder / self._source.path.name):
+        if told := _placeholder_reason(self._folder / self._source.path.name):
             raise AssetError(f"{self._source.path}: {told}")
         start = self._inside_package(self._folder / self._source.path.name)
         root = self._open(start)
@@ -77,7 +77,7 @@ class LayerFiles:
     def texture(self, layer: Sdf.Layer, name: str) -> bytes | None:
         """Return the content of the texture file that ``layer`` names, or None with a finding."""
         base = self._places[layer.identifier]
-        place = self._moved(base, name) or self._locate(base, name, "texture")
+        place = self._find_foreign_path(base, name) or self._locate(base, name, "texture")
         if place is None:
             return None
         if place.member is not None:
@@ -101,14 +101,14 @@ class LayerFiles:
                 f"{self._source.path}: it and the layers that it names have more than {self._source.limits.max_bytes} bytes"
                 "; simplify it"
             )
-        layer = self._copied(place)
+        layer = self._copy_layer(place)
         if layer is not None:
             self._layers[place] = layer
             self._places[layer.identifier] = place
             self._use(place.file)
         return layer
 
-    def _copied(self, place: Place) -> Sdf.Layer | None:
+    def _copy_layer(self, place: Place) -> Sdf.Layer | None:
         name = place.file.name if place.member is None else place.member
         if not name.lower().endswith(SUFFIX):
             named = str(place.file) if place.member is None else package_path(place.file, place.member)
@@ -120,13 +120,13 @@ class LayerFiles:
                 content = self._archives[place.file].read(place.member, "layer") or b""
             return mtlx_layer(content, name, self._source)
         except AssetError as error:
-            self._source.find(f"{error}; its materials were not read")
+            self._source.add_finding(f"{error}; its materials were not read")
             return None
 
     def _use(self, file: Path) -> None:
         self.files.add(file)
         if not file.is_relative_to(self._folder):
-            self._source.find(f"files were read from above its own folder, below the root {self._root.name!r}")
+            self._source.add_finding(f"files were read from above its own folder, below the root {self._root.name!r}")
 
     def _join(self, layer: Sdf.Layer, place: Place) -> list[Place]:
         """Replace the layer names in a layer by their copies; return the places of newly opened layers."""
@@ -147,14 +147,16 @@ class LayerFiles:
         if not place.file.is_file() or (place.member and place.member not in self._archives[place.file].names):
             self.missing.add(named)
             return None
-        if told := _told_of_no_layer(place.file):
+        if told := _placeholder_reason(place.file):
             self.missing.add(named)
-            self._source.find(f"layer {named[:80]!r} {told}")
+            self._source.add_finding(f"layer {named[:80]!r} {told}")
             return None
         try:
             return self._open(place)
         except Tf.ErrorException as error:
-            self._source.find(f"layer {named[:80]!r} cannot be read: {broken(error)}; carried on without it")
+            self._source.add_finding(
+                f"layer {named[:80]!r} cannot be read: {broken_usd_cause(error)}; carried on without it"
+            )
             return None
 
     def _locate(self, base: Place, name: str, what: str) -> Place | None:
@@ -174,10 +176,10 @@ class LayerFiles:
             ):
                 return self._inside_package(file) if what == "layer" else Place(file)
         kind = ", or is no USD layer" if what == "layer" else ""
-        self._source.find(f"{what} {name[:80]!r} lies outside the asset's folder{kind}; it was not followed")
+        self._source.add_finding(f"{what} {name[:80]!r} lies outside the asset's folder{kind}; it was not followed")
         return None
 
-    def _moved(self, base: Place, name: str) -> Place | None:
+    def _find_foreign_path(self, base: Place, name: str) -> Place | None:
         """Return the local file for a texture path of another machine, by the longest end of the path that exists near the
         layer.
         """
@@ -187,7 +189,7 @@ class LayerFiles:
         for first in range(len(parts)):
             file = _resolved(base.file.parent.joinpath(*parts[first:]))
             if file is not None and file.is_relative_to(self._root) and file.is_file():
-                self._source.find(
+                self._source.add_finding(
                     f"textures are not where it says, and were read from beside it, such as {file.name[:80]}"
                 )
                 return Place(file)
@@ -214,7 +216,7 @@ class LayerFiles:
 
         layer.Traverse(Sdf.Path.absoluteRootPath, look)
         for path in found:
-            self._source.find("its animation by value clips was left out")
+            self._source.add_finding("its animation by value clips was left out")
             layer.GetPrimAtPath(path).ClearInfo("clips")
             layer.GetPrimAtPath(path).ClearInfo("clipSets")
 
@@ -291,12 +293,12 @@ def _items(edits: Sdf.PathListOp) -> list[Sdf.Reference]:
     return list(edits.GetAddedOrExplicitItems())
 
 
-def _told_of_no_layer(file: Path) -> str | None:
+def _placeholder_reason(file: Path) -> str | None:
     """Return what a file is instead of a layer, such as a Git LFS pointer, and a remedy; None for other files."""
     if not file.is_file():
         return None
     with open_regular(file, AssetError) as stream:
-        return told_of_no_file_itself(stream.read(_HEAD_BYTES))
+        return placeholder_description(stream.read(_HEAD_BYTES))
 
 
 def _resolved(path: Path) -> Path | None:

@@ -9,22 +9,22 @@ from typing import TypeAlias
 import numpy as np
 from pxr import Sdf, Usd, UsdPhysics
 
-from manitwin.assets.articulation import Node, Tree, rigid_links
-from manitwin.assets.asset_files import MOST_NAMED, of_left_out, of_locked
+from manitwin.assets.articulation import BodyNode, LinkTree, build_link_tree
+from manitwin.assets.asset_files import MOST_NAMED, left_out_remarks, locked_joint_remarks
 from manitwin.assets.joints import DeclaredJoint, Joints
-from manitwin.assets.readers.usd_held import held_together
+from manitwin.assets.readers.usd_constraints import combined_constraint
 from manitwin.assets.readers.usd_joints import StageJoint, declared_joint, name_of, stage_joints
 from manitwin.assets.readers.usd_masses import StageUnits, body_of
 from manitwin.assets.readers.usd_shapes import is_rendered, is_solid
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.usd_places import PlacedPrim
+from manitwin.formats.meshes.usd_placed_prims import PlacedPrim
 
 Body: TypeAlias = "Sdf.Path | None"
 """The path of a rigid body, or None for prims outside all rigid bodies, which are static."""
 
 
 @dataclass(frozen=True)
-class Chosen:
+class StageSelection:
     """The selected prims: the ``whole`` stage, or one articulated object; ``joints`` are all joints of the stage.
 
     ``moving`` is the joint tree, None if no joint is kept, with ``bodies`` and ``nodes`` in its order. ``partial``: other
@@ -36,8 +36,8 @@ class Chosen:
     whole: bool = True
     partial: bool = False
     bodies: tuple[Body, ...] = ()
-    nodes: tuple[Node, ...] = ()
-    moving: Tree | None = None
+    nodes: tuple[BodyNode, ...] = ()
+    moving: LinkTree | None = None
 
     def node_of(self, placed: PlacedPrim) -> int:
         """Return the index of the node to which a prim belongs."""
@@ -50,9 +50,9 @@ def path_of_body(placed: PlacedPrim) -> Body:
     return None if body is None else body.GetPath()
 
 
-def chosen_bodies(
+def select_bodies(
     stage: Usd.Stage, placed: Sequence[PlacedPrim], units: StageUnits, joints: Joints, source: MeshSource
-) -> Chosen:
+) -> StageSelection:
     """Return the part of a stage that is read: all of it if no joint moves, or with ``joints="part"``.
 
     With "lock" and "keep" it is the first articulated object, in the pose of the stage; with "keep" including links and joints.
@@ -61,40 +61,40 @@ def chosen_bodies(
     of_path = {each.prim.GetPath(): each for each in placed if not each.copy}
     found = stage_joints(placed, of_path, source)
     declared = tuple(declared_joint(joint, units) for joint in found)
-    held = [joint for joint in found if joint.holds]
+    held = [joint for joint in found if joint.is_constraint]
     if joints == "part" or all(joint.kind == "fixed" for joint in held):
-        return Chosen(tuple(placed), declared)
+        return StageSelection(tuple(placed), declared)
     owned = [(each, path_of_body(each)) for each in placed]
     default = stage.GetDefaultPrim()
     world = default.GetPath() if default else Sdf.Path.absoluteRootPath
-    joining = [joint for joint in held if all(joint.ends) or _holds_what_stands(joint, owned, world)]
+    joining = [joint for joint in held if all(joint.ends) or _anchors_static_prims(joint, owned, world)]
     fast = {_below(joint, world) for joint in joining} - {None}
     owned = [(each, body) for each, body in owned if body is not None or _is_below(each, fast)]
-    groups = _joined(joining, owned)
+    groups = _joint_graph(joining, owned)
     solid = {body for each, body in owned if is_solid(each.prim)}
     moved = [joint for joint in joining if joint.kind != "fixed" and groups[joint.ends[0]] & solid]
     if not moved:
-        return Chosen(tuple(placed), declared)
+        return StageSelection(tuple(placed), declared)
     chosen = groups[moved[0].ends[0]]
     kept = [(each, body) for each, body in owned if body in chosen]
     left = _left_out(placed, {id(each) for each, _ in kept}, held)
-    for sentence in of_left_out(left, "bodies and shapes"):
-        source.find(sentence)
+    for sentence in left_out_remarks(left, "bodies and shapes"):
+        source.add_finding(sentence)
     mine, within = tuple(each for each, _ in kept), [joint for joint in joining if joint.ends[0] in chosen]
     if joints == "lock":
-        for sentence in of_locked([joint.told() for joint in within if joint.kind != "fixed"]):
-            source.find(sentence)
-        return Chosen(mine, declared, whole=False, partial=bool(left))
+        for sentence in locked_joint_remarks([joint.label() for joint in within if joint.kind != "fixed"]):
+            source.add_finding(sentence)
+        return StageSelection(mine, declared, whole=False, partial=bool(left))
     root = _root(list(dict.fromkeys(body for _, body in kept)), within, held, of_path)
     order, nodes, motions = _tree(root, within, kept, of_path, units, source)
-    tree = rigid_links(nodes)
+    tree = build_link_tree(nodes)
     for sentence in tree.remarks:
-        source.find(sentence)
+        source.add_finding(sentence)
     moving = tree if tree.joints else None
     scale = np.diag([units.m] * 3 + [1.0])
     in_units = {body: np.linalg.inv(scale) @ motion @ scale for body, motion in zip(order, motions, strict=True)}
     mine = tuple(replace(each, to_world=in_units[body] @ each.to_world) for each, body in kept)
-    return Chosen(mine, declared, False, bool(left), tuple(order), tuple(nodes), moving)
+    return StageSelection(mine, declared, False, bool(left), tuple(order), tuple(nodes), moving)
 
 
 def _below(joint: StageJoint, world: Sdf.Path) -> Body:
@@ -110,7 +110,7 @@ def _below(joint: StageJoint, world: Sdf.Path) -> Body:
     return None if joint.kind == "fixed" else world
 
 
-def _holds_what_stands(joint: StageJoint, owned: Sequence[tuple[PlacedPrim, Body]], world: Sdf.Path) -> bool:
+def _anchors_static_prims(joint: StageJoint, owned: Sequence[tuple[PlacedPrim, Body]], world: Sdf.Path) -> bool:
     below = _below(joint, world)
     fast = (each for each, body in owned if body is None and is_solid(each.prim))
     return below is not None and any(_is_below(each, {below}) for each in fast)
@@ -120,7 +120,7 @@ def _is_below(placed: PlacedPrim, paths: Set[Body]) -> bool:
     return Sdf.Path.absoluteRootPath in paths or any(prim.GetPath() in paths for prim in placed.lineage())
 
 
-def _joined(joints: Sequence[StageJoint], owned: Sequence[tuple[PlacedPrim, Body]]) -> dict[Body, set[Body]]:
+def _joint_graph(joints: Sequence[StageJoint], owned: Sequence[tuple[PlacedPrim, Body]]) -> dict[Body, set[Body]]:
     """Return, for each body, the set of bodies that joints connect to it."""
     group: dict[Body, set[Body]] = {body: {body} for _, body in owned}
     for joint in joints:
@@ -143,7 +143,7 @@ def _left_out(placed: Sequence[PlacedPrim], kept: Set[int], held: Sequence[Stage
         if body is None:
             left.setdefault(each.prim.GetPath(), f"shape {each.prim.GetName()!r} is of no rigid body")
         else:
-            how = f"moves by joint {moves[body].told()}" if body in moves else "is joined to nothing that moves"
+            how = f"moves by joint {moves[body].label()}" if body in moves else "is joined to nothing that moves"
             left.setdefault(body, f"body {body.name!r} {how}")
     return list(left.values())
 
@@ -177,7 +177,7 @@ def _tree(
     of_path: Mapping[Sdf.Path, PlacedPrim],
     units: StageUnits,
     source: MeshSource,
-) -> tuple[list[Body], list[Node], list[np.ndarray]]:
+) -> tuple[list[Body], list[BodyNode], list[np.ndarray]]:
     """Return the bodies, parents first, a node for each, and the correction ``(4, 4)`` of its pose.
 
     The correction moves a body from its pose in the stage to the pose that joints require, in the stage's axes and metres. A
@@ -191,29 +191,31 @@ def _tree(
             at.setdefault(body, {}).setdefault(other, []).append(joint)
     place_of = {root: 0}
     order, used = [root], set()
-    nodes, motions = [Node(_named(root, joints, of_path), None, root in seen)], [np.eye(4)]
+    nodes, motions = [BodyNode(_body_name(root, joints, of_path), None, root in seen)], [np.eye(4)]
     for extra in (False, True):
         for body in order:  # grows by the bodies attached to it
             for other, between in at.get(body, {}).items():
                 if other in place_of or (not extra and all(joint.is_extra for joint in between)):
                     continue
-                joint, held = held_together(between, body, of_path, units, source)
+                joint, held = combined_constraint(between, body, of_path, units, source)
                 holder = motions[place_of[body]]
                 moves = None if held.joint is None else held.joint.moved(holder)
-                nodes.append(Node(_named(other, joints, of_path), place_of[body], other in seen, moves, held.cause))
+                nodes.append(
+                    BodyNode(_body_name(other, joints, of_path), place_of[body], other in seen, moves, held.cause)
+                )
                 motions.append(holder @ held.motion)
                 place_of[other] = len(order)
                 order.append(other)
                 used |= {each.prim.GetPath() for each in (between if held.cause else (joint,))}
-    closing = [joint.told() for joint in joints if joint.prim.GetPath() not in used]
+    closing = [joint.label() for joint in joints if joint.prim.GetPath() not in used]
     for told in closing[:MOST_NAMED]:
-        source.find(f"joint {told} closes a loop and was left out")
+        source.add_finding(f"joint {told} closes a loop and was left out")
     if len(closing) > MOST_NAMED:
-        source.find(f"{len(closing) - MOST_NAMED} more joints close loops and were left out")
+        source.add_finding(f"{len(closing) - MOST_NAMED} more joints close loops and were left out")
     return order, nodes, motions
 
 
-def _named(body: Body, joints: Sequence[StageJoint], of_path: Mapping[Sdf.Path, PlacedPrim]) -> str:
+def _body_name(body: Body, joints: Sequence[StageJoint], of_path: Mapping[Sdf.Path, PlacedPrim]) -> str:
     """Return a body's name; for static prims, that of the prim which a joint names."""
     if body is not None:
         return name_of(of_path[body].prim)

@@ -11,10 +11,10 @@ from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from manitwin.assets.asset import Contact, Inertial, combined_inertial
 from manitwin.assets.filled_hulls import filled_hulls
-from manitwin.assets.readers.usd_shapes import Felt, in_metres
+from manitwin.assets.readers.usd_shapes import Felt, metric_transform
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.usd_places import PlacedPrim
+from manitwin.formats.meshes.usd_placed_prims import PlacedPrim
 from manitwin.formats.meshes.usd_units import kilograms_per_unit, metres_per_unit
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 
@@ -43,7 +43,7 @@ class StageUnits:
         if not (np.isfinite(unit_kg) and unit_kg > 0):
             raise AssetError(f"{source.path}: its kilogramsPerUnit is {unit_kg}; give a number above 0, such as 1")
         if not declared:
-            source.find(f"it declares no metersPerUnit: USD's rule of {unit_m:g} m was taken")
+            source.add_finding(f"it declares no metersPerUnit: USD's rule of {unit_m:g} m was taken")
         return cls(unit_m, unit_kg, declared)
 
 
@@ -76,20 +76,20 @@ def declared_inertial(
         rigid = body_of(each)
         if any(above != prim and (above.GetPath(), rigid) in taken for above in each.lineage()):
             continue
-        body = _of_prim(each, units, source)
+        body = _inertial_of_prim(each, units, source)
         if body.mass_kg is not None:
             taken.add((prim.GetPath(), rigid))
             bodies.append(body)
         elif body.inertia_kg_m2 is not None or body.center_of_mass_m is not None:
-            source.find(f"{prim.GetName()} has a centre of mass or an inertia and no mass")
+            source.add_finding(f"{prim.GetName()} has a centre of mass or an inertia and no mass")
     if bodies:
         return combined_inertial(bodies)
     if any(each.prim.HasAPI(UsdPhysics.MassAPI) for each in placed):
-        source.find("it has a mass API and no mass")
-    return _of_densities(felt, units, source)
+        source.add_finding("it has a mass API and no mass")
+    return _inertial_from_densities(felt, units, source)
 
 
-def of_its_hulls(inertial: Inertial, felt: Sequence[Felt]) -> Inertial:
+def complete_from_hulls(inertial: Inertial, felt: Sequence[Felt]) -> Inertial:
     """Complete an inertial with centre and inertia of its mass, distributed uniformly in the hulls of its collision shapes.
 
     Source: UsdPhysics schema, MassAPI: undeclared values follow from the collision shapes.
@@ -110,7 +110,7 @@ def of_its_hulls(inertial: Inertial, felt: Sequence[Felt]) -> Inertial:
     )
 
 
-def _of_densities(felt: Sequence[Felt], units: StageUnits, source: MeshSource) -> Inertial:
+def _inertial_from_densities(felt: Sequence[Felt], units: StageUnits, source: MeshSource) -> Inertial:
     """Return the inertial of collision hulls filled with their densities; empty if a shape has no density.
 
     The density is that of the nearest MassAPI at or above a shape, or else of its bound material (UsdPhysics, density).
@@ -123,7 +123,7 @@ def _of_densities(felt: Sequence[Felt], units: StageUnits, source: MeshSource) -
         filled.append((shape.vertices, density * units.kg / units.m**3))
     found = filled_hulls(filled)
     if found.mass_kg is not None:
-        source.find(
+        source.add_finding(
             "its mass follows from a density; it, the centre and the inertia are of the hulls of its collision shapes"
         )
     return found
@@ -158,19 +158,19 @@ def declared_contact(placed: Sequence[PlacedPrim], felt: Sequence[Felt], source:
         )
     contacts = list(found.values())
     if any(contact != contacts[0] for contact in contacts):
-        source.find(f"{len(contacts)} physics materials are bound to its collision shapes; the first was taken")
+        source.add_finding(f"{len(contacts)} physics materials are bound to its collision shapes; the first was taken")
     if not contacts and any(each.prim.HasAPI(UsdPhysics.MaterialAPI) for each in placed):
-        source.find("it has a physics material that is bound to no collision shape")
+        source.add_finding("it has a physics material that is bound to no collision shape")
     return contacts[0] if contacts else Contact()
 
 
-def _of_prim(placed: PlacedPrim, units: StageUnits, source: MeshSource) -> Inertial:
-    prim, unit_m, unit_kg, to_world = placed.prim, units.m, units.kg, in_metres(placed, units.m, source)
+def _inertial_of_prim(placed: PlacedPrim, units: StageUnits, source: MeshSource) -> Inertial:
+    prim, unit_m, unit_kg, to_world = placed.prim, units.m, units.kg, metric_transform(placed, units.m, source)
     api = UsdPhysics.MassAPI(prim)
     mass = authored_number(api.GetMassAttr(), source)
     density = authored_number(api.GetDensityAttr(), source)
     if density and not mass:
-        source.find(
+        source.add_finding(
             f"{prim.GetName()} declares a density of {density * unit_kg / unit_m**3:g} kg/m3 in place of a mass"
         )
     center = api.GetCenterOfMassAttr().Get()
@@ -182,7 +182,7 @@ def _of_prim(placed: PlacedPrim, units: StageUnits, source: MeshSource) -> Inert
         raise AssetError(f"{source.path}: the mass properties of {prim.GetPath()} are not finite; give finite numbers")
     left, stretch, right = np.linalg.svd(to_world[:3, :3] / unit_m)
     if np.abs(stretch - 1).max() > 1e-5:
-        source.find(
+        source.add_finding(
             f"{prim.GetName()} is scaled by {stretch.round(6).tolist()}, which its mass and inertia do not follow"
         )
     axes = rotation_from_quaternion_wxyz(wxyz) if np.linalg.norm(wxyz) > 0 else np.eye(3)

@@ -38,7 +38,7 @@ def mtlx_layer(data: bytes, name: str, source: MeshSource) -> Sdf.Layer:
     stage.SetDefaultPrim(UsdGeom.Scope.Define(stage, f"/{_ROOT}").GetPrim())
     scope = UsdGeom.Scope.Define(stage, f"/{_ROOT}/{_MATERIALS}").GetPath()
     if any(_tag(each) == "include" for each in root):
-        source.find(f"documents that {name[:80]} includes were not read")
+        source.add_finding(f"documents that {name[:80]} includes were not read")
     budget = iter(range(_MOST_NODES))
     for element in root:
         if _tag(element) != "surfacematerial":
@@ -73,14 +73,16 @@ class _Nodes:
             made = UsdShade.Shader.Define(self._stage, path)
             made.CreateIdAttr(f"ND_{_tag(each)}_{each.get('type') or ''}")
             self._made[each] = made
-            waiting += [behind for socket in _inputs(each) if (behind := self._behind(socket, each)) is not None]
+            waiting += [
+                behind for socket in _inputs(each) if (behind := self._connected_node(socket, each)) is not None
+            ]
         for each, made in self._made.items():
             for socket in _inputs(each):
                 self._connect(made, socket, each)
         return self._made[node]
 
     def _connect(self, shader: UsdShade.Shader, socket: etree._Element, node: etree._Element) -> None:
-        name, behind = socket.get("name") or "", self._behind(socket, node)
+        name, behind = socket.get("name") or "", self._connected_node(socket, node)
         if not Sdf.Path.IsValidNamespacedIdentifier(name):
             return
         if behind is not None:
@@ -98,7 +100,7 @@ class _Nodes:
             if numbers is not None:
                 shader.CreateInput(name, kind).Set(numbers[0] if count == 1 else tuple(numbers))
 
-    def _behind(self, socket: etree._Element, node: etree._Element) -> etree._Element | None:
+    def _connected_node(self, socket: etree._Element, node: etree._Element) -> etree._Element | None:
         """Return the node connected to an input: in the same scope, or through the output of a graph."""
         socket = self._interface(socket, node)
         scope = node.getparent() if node.getparent() is not None else self._root

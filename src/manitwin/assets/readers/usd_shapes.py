@@ -16,10 +16,10 @@ from manitwin.assets.asset import CollisionShape
 from manitwin.assets.asset_files import MAX_SHAPES
 from manitwin.assets.readers.usd_layers import LayerFiles
 from manitwin.errors import AssetError
+from manitwin.formats.meshes.shading_normals import triangle_fans
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import DEFAULT_COLOR, bake_transform, make_part, pbr_material
-from manitwin.formats.meshes.triangles import triangle_fans
-from manitwin.formats.meshes.usd_places import PlacedPrim
+from manitwin.formats.meshes.usd_placed_prims import PlacedPrim
 from manitwin.formats.meshes.usd_skin import Skeletons
 from manitwin.formats.meshes.usd_surfaces import PreviewSurfaces, UsdSurface, flat_colored
 from manitwin.formats.meshes.usdz import display_color, mesh_parts, mesh_polygons
@@ -53,18 +53,18 @@ class StageShapes:
         self._faces = 0
         self._made: dict[Sdf.Path, list[trimesh.Trimesh]] = {}
         self.placed = tuple(placed)
-        self._shapes = [each for each in placed if self._is_shape(each.prim) and not self._is_nothing(each.prim)]
+        self._shapes = [each for each in placed if self._is_shape(each.prim) and not self._has_zero_size(each.prim)]
 
     def to_world(self, placed: PlacedPrim) -> np.ndarray:
         """Return the transform ``(4, 4)`` from a prim's own axes and unit to the stage's axes and metres."""
-        return in_metres(placed, self._unit_m, self._source)
+        return metric_transform(placed, self._unit_m, self._source)
 
     def visual(self) -> list[Seen]:
         """Return the visual parts: visible shapes with a purpose for rendering."""
         parts: list[Seen] = []
         for placed in self._shapes:
             if placed.is_hidden():
-                self._source.find("hidden shapes in it are no part of what is seen")
+                self._source.add_finding("hidden shapes in it are no part of what is seen")
             elif is_rendered(placed):
                 matrix = self.to_world(placed)
                 parts += [
@@ -77,11 +77,13 @@ class StageShapes:
         for placed in self._shapes:
             owner = nearest_with(placed, UsdPhysics.CollisionAPI)
             if owner is None and UsdGeom.Imageable(placed.prim).ComputePurpose() == UsdGeom.Tokens.guide:
-                self._source.find("shapes of purpose guide without a collision API were taken as collision shapes")
+                self._source.add_finding(
+                    "shapes of purpose guide without a collision API were taken as collision shapes"
+                )
                 yield placed
             elif owner is not None and UsdPhysics.CollisionAPI(owner).GetCollisionEnabledAttr().Get() is not False:
                 if owner != placed.prim:
-                    self._source.find(
+                    self._source.add_finding(
                         f"the collision API is on {owner.GetTypeName() or 'a prim'}, not on the shapes below it"
                     )
                 yield placed
@@ -114,7 +116,9 @@ class StageShapes:
             ball.apply_translation(centre)
             return _grey(ball, prim), True
         if approximation not in ("none", UsdPhysics.Tokens.convexHull):
-            self._source.find(f"collision shapes are left to the simulator to approximate ({str(approximation)[:40]})")
+            self._source.add_finding(
+                f"collision shapes are left to the simulator to approximate ({str(approximation)[:40]})"
+            )
         return mesh, approximation == UsdPhysics.Tokens.convexHull
 
     def _parts(self, placed: PlacedPrim) -> list[trimesh.Trimesh]:
@@ -127,7 +131,7 @@ class StageShapes:
         if prim.IsA(UsdGeom.Mesh):
             return mesh_parts(UsdGeom.Mesh(prim), self._surfaces, self._skeletons, self._source)
         solid = self._primitive(prim)
-        material = flat_colored(self._surfaces.of(prim), display_color(prim))
+        material = flat_colored(self._surfaces.bound_surface(prim), display_color(prim))
         return [make_part(solid.vertices, solid.faces, material=material, name=prim.GetName())]
 
     def _primitive(self, prim: Usd.Prim) -> trimesh.Trimesh:
@@ -168,15 +172,15 @@ class StageShapes:
         ):
             return False  # drawn for users, such as grasp lines
         if prim.IsA(UsdGeom.Gprim):
-            self._source.find(f"{prim.GetTypeName()} prims in it were left out")
+            self._source.add_finding(f"{prim.GetTypeName()} prims in it were left out")
         return False
 
-    def _is_nothing(self, prim: Usd.Prim) -> bool:
+    def _has_zero_size(self, prim: Usd.Prim) -> bool:
         """Return whether a shape has zero size, as URDF markers have."""
         sizes = (prim.GetAttribute(name) for name in ("size", "radius", "height") if not prim.IsA(UsdGeom.Mesh))
         nothing = any(each and each.Get(Usd.TimeCode.EarliestTime()) == 0 for each in sizes)
         if nothing:
-            self._source.find("shapes of no size in it were left out")
+            self._source.add_finding("shapes of no size in it were left out")
         return nothing
 
     def _checked(self, part: trimesh.Trimesh, prim: Usd.Prim) -> trimesh.Trimesh:
@@ -199,7 +203,7 @@ def check_prims(placed: Sequence[PlacedPrim], source: MeshSource) -> None:
         raise AssetError(f"{source.path}: more than {MAX_SHAPES} shapes; it is no single object")
 
 
-def in_metres(placed: PlacedPrim, unit_m: float, source: MeshSource) -> np.ndarray:
+def metric_transform(placed: PlacedPrim, unit_m: float, source: MeshSource) -> np.ndarray:
     """Return the transform ``(4, 4)`` from a prim's own axes and unit to the stage's axes and metres."""
     matrix = np.diag([unit_m, unit_m, unit_m, 1.0]) @ placed.to_world
     if not np.isfinite(matrix).all() or np.abs(matrix).max() > _MAX_SIZE_M:

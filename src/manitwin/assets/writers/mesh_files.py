@@ -55,7 +55,7 @@ def hull_files(twin: TwinContent, folder: str) -> dict[str, bytes]:
     }
 
 
-def lost_maps(twin: TwinContent) -> tuple[str, ...]:
+def lost_texture_lines(twin: TwinContent) -> tuple[str, ...]:
     """Return README lines on the textures that an OBJ material cannot hold."""
     materials = [material_of(part) for part in twin.visual]
     lost = []
@@ -130,7 +130,7 @@ def obj_file(
         corners.append((index.reshape(-1)[faces] + 1).astype(str))
     if material is not None:
         lines.append(f"usemtl {material}")
-    lines += [f"f {' '.join(face)}" for face in _joined(*corners).tolist()]
+    lines += [f"f {' '.join(face)}" for face in _format_corners(*corners).tolist()]
     return ("\n".join(lines) + "\n").encode("ascii")
 
 
@@ -155,7 +155,7 @@ def mtl_file(
     return ("\n".join(lines) + "\n").encode("ascii")
 
 
-def _joined(place: np.ndarray | None, uv: np.ndarray | None, normal: np.ndarray | None) -> np.ndarray:
+def _format_corners(place: np.ndarray | None, uv: np.ndarray | None, normal: np.ndarray | None) -> np.ndarray:
     """Format the corners of faces ``(F, 3)`` as ``v``, ``v/vt``, ``v//vn`` or ``v/vt/vn``."""
     assert place is not None
     words = place

@@ -22,7 +22,7 @@ from manitwin.assets.writers.mass_properties import (
     inertial_of_link,
     physics_file,
 )
-from manitwin.assets.writers.mesh_files import VisualPart, hull_files, lost_maps, visual_parts
+from manitwin.assets.writers.mesh_files import VisualPart, hull_files, lost_texture_lines, visual_parts
 from manitwin.formats.xml_file import add, document, new_element, number_text
 from manitwin.geometry.articulation import ArticulatedJoint
 from manitwin.physics.mujoco.body import ROLLING_FRICTION_M, TORSIONAL_FRICTION_M
@@ -52,7 +52,7 @@ def export(twin: TwinContent) -> Exported:
         cannot_say=(
             f"dynamic friction and restitution: MuJoCo has one coefficient and a soft contact; {PHYSICS_FILE} has both.",
             "how the friction of two bodies is combined: MuJoCo takes the larger of the two.",
-            *lost_maps(twin),
+            *lost_texture_lines(twin),
             *([f"{left_out} visual parts of fewer than 4 vertices, which MuJoCo does not take."] if left_out else []),
             *(
                 ["effort and velocity limits of joints: MuJoCo has them for motors alone."]
@@ -87,7 +87,7 @@ def _add_body(root: etree._Element, twin: TwinContent, parts: list[VisualPart], 
     body = add(add(root, "worldbody"), "body", name=twin.name)
     add(body, "freejoint", name=twin.name)
     if not twin.record.links:
-        _fill(body, twin, inertial_of(twin), parts, hulls, np.zeros(3))
+        _fill_body(body, twin, inertial_of(twin), parts, hulls, np.zeros(3))
         return
     joints = joints_of(twin.record)
     origins = [np.zeros(3), *(joint.origin_m for joint in joints)]
@@ -101,7 +101,7 @@ def _add_body(root: etree._Element, twin: TwinContent, parts: list[VisualPart], 
             _add_joint(bodies[place], joint)
         own = [part for part in parts if link_of[part.name] == place]
         felt = [hulls[number] for number in link.hulls]
-        _fill(bodies[place], twin, inertial_of_link(twin, link), own, felt, origins[place])
+        _fill_body(bodies[place], twin, inertial_of_link(twin, link), own, felt, origins[place])
 
 
 def _add_joint(body: etree._Element, joint: ArticulatedJoint) -> None:
@@ -118,7 +118,7 @@ def _add_joint(body: etree._Element, joint: ArticulatedJoint) -> None:
     add(body, "joint", name=joint.name, **said)
 
 
-def _fill(
+def _fill_body(
     body: etree._Element,
     twin: TwinContent,
     inertial: TwinInertial,

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from importlib import import_module
 
 from manitwin.assets.writers.exporter import Exporter
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.models.registry import backends, target
 
 
@@ -25,7 +25,7 @@ def formats() -> tuple[str, ...]:
 def exporter(name: str) -> Exporter:
     """Return the exporter of a format. Raises UsageError if it is unknown or its package cannot be imported."""
     if name not in formats():
-        raise UsageError(choose_from("format", name, formats()))
+        raise UsageError(unknown_name_message("format", name, formats()))
     module, _, function = target("exporter", name).partition(":")
     try:
         found: Exporter = getattr(import_module(module), function)
@@ -44,7 +44,7 @@ def chosen_formats(names: Iterable[str] | None) -> tuple[str, ...]:
     wanted = {name.strip().lower() for name in names if name.strip()} if names is not None else {"all"}
     for name in sorted(wanted - {"all"}):
         if name not in formats():
-            raise UsageError(choose_from("format", name, {*formats(), "all"}))
+            raise UsageError(unknown_name_message("format", name, {*formats(), "all"}))
     if not wanted:
         raise UsageError(f"no format is named; valid: all, {', '.join(formats())}")
     return formats() if "all" in wanted else tuple(name for name in formats() if name in wanted)

@@ -62,7 +62,7 @@ def export(twin: TwinContent) -> Exported:
         f"description/objects_description/{name}/base0.json": canonical_json(_description(twin)).encode(),
         "object_mass.json": canonical_json({f"{name}/base0": twin.physical.mass_kg.value}).encode(),
     }
-    return Exported(files=files, main=f"{folder}/model_data0.json", cannot_say=_cannot_say(twin, grasps))
+    return Exported(files=files, main=f"{folder}/model_data0.json", cannot_say=_omissions(twin, grasps))
 
 
 def _from_above(rows: GraspRows) -> GraspRows:
@@ -114,7 +114,7 @@ def _model_data(twin: TwinContent, grasps: GraspRows) -> dict[str, Any]:
         "functional_point_description": [f"{point.label}: {point.description}" for point in functional],
         "orientation_point": [transform(None, (low + high) / 2).tolist()],
         "orientation_point_description": ["the middle of the object, with the axes of its mesh: Y is up"],
-        "stable": any(_stands(placement) for placement in twin.record.placements or []),
+        "stable": any(_is_upright_stable(placement) for placement in twin.record.placements or []),
         "provenance": list(provenance_lines(twin.record)),
         "license": license_of(twin.record),
         "attribution": twin.record.source.attribution,
@@ -139,7 +139,7 @@ def _bounds(twin: TwinContent) -> tuple[np.ndarray, np.ndarray]:
     return corners.min(axis=0), corners.max(axis=0)
 
 
-def _stands(placement: Placement) -> bool:
+def _is_upright_stable(placement: Placement) -> bool:
     """Return whether the object is stable as RoboTwin places it, with the object frame's +Z up."""
     up = rotation_from_quaternion_wxyz(np.array(placement.quaternion_wxyz))[2, 2]
     return placement.settled and math.acos(min(1.0, float(up))) <= STABLE_TILT_RAD
@@ -159,7 +159,7 @@ def _collision_glb(twin: TwinContent) -> bytes:
 def _description(twin: TwinContent) -> dict[str, Any]:
     language = twin.record.language
     assert language is not None  # an accepted twin has language
-    seen, unseen = seen_and_unseen(language, SEEN, UNSEEN)
+    seen, unseen = split_phrases(language, SEEN, UNSEEN)
     return {"raw_description": language.category, "seen": seen, "unseen": unseen}
 
 
@@ -171,7 +171,7 @@ def _physics(twin: TwinContent) -> dict[str, Any]:
     }
 
 
-def _cannot_say(twin: TwinContent, grasps: GraspRows) -> tuple[str, ...]:
+def _omissions(twin: TwinContent, grasps: GraspRows) -> tuple[str, ...]:
     lines = [
         "mass: RoboTwin gives rigid objects 0.01 kg; where ROBOTWIN_OBJECT_MASS_CONFIG names object_mass.json, newer"
         " versions take the mass from it. The inertia stays that of density 1000 either way.",
@@ -198,8 +198,8 @@ def noun_phrases(language: Language, count: int) -> list[str]:
     Instructions use them after "the", so captions that are whole sentences or commands are skipped. Raises ExportError if too
     few phrases are available.
     """
-    captions = (phrase for text in (language.caption, *language.captions) if (phrase := _of_caption(text)))
-    phrases = _distinct([*captions, *_of_attributes(language)])
+    captions = (phrase for text in (language.caption, *language.captions) if (phrase := _caption_noun_phrase(text)))
+    phrases = _distinct([*captions, *_attribute_phrases(language)])
     if len(phrases) < count:
         raise ExportError(
             f"only {len(phrases)} phrases for {language.category!r}, {count} are needed; give it captions"
@@ -207,7 +207,7 @@ def noun_phrases(language: Language, count: int) -> list[str]:
     return phrases[:count]
 
 
-def seen_and_unseen(language: Language, seen: int, unseen: int) -> tuple[list[str], list[str]]:
+def split_phrases(language: Language, seen: int, unseen: int) -> tuple[list[str], list[str]]:
     """Return training phrases and disjoint test phrases, the latter spread evenly over all kinds of phrases."""
     phrases = noun_phrases(language, seen + unseen)
     step = (seen + unseen) // unseen
@@ -215,7 +215,7 @@ def seen_and_unseen(language: Language, seen: int, unseen: int) -> tuple[list[st
     return [phrase for phrase in phrases if phrase not in held_out], held_out
 
 
-def _of_caption(text: str) -> str | None:
+def _caption_noun_phrase(text: str) -> str | None:
     """Return the noun phrase of a caption, or None if the caption is not a noun phrase."""
     line = one_line(text).rstrip(".")
     if not _ARTICLE.match(line) or ". " in line or _FINITE_VERB.search(line) or len(line.split()) > _MAX_WORDS:
@@ -223,7 +223,7 @@ def _of_caption(text: str) -> str | None:
     return _ARTICLE.sub("", line)
 
 
-def _of_attributes(language: Language) -> Iterator[str]:
+def _attribute_phrases(language: Language) -> Iterator[str]:
     noun, material, shape, size = (
         one_line(text) for text in (language.category, language.material, language.shape, language.size)
     )

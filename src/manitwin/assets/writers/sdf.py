@@ -22,7 +22,7 @@ from manitwin.assets.writers.mass_properties import (
     inertial_of_link,
     physics_file,
 )
-from manitwin.assets.writers.mesh_files import VisualPart, hull_files, lost_maps, visual_parts
+from manitwin.assets.writers.mesh_files import VisualPart, hull_files, lost_texture_lines, visual_parts
 from manitwin.formats.markdown import one_line
 from manitwin.formats.xml_file import add, document, new_element, number_text
 from manitwin.geometry.articulation import ArticulatedJoint
@@ -63,7 +63,7 @@ def export(twin: TwinContent) -> Exported:
             f"dynamic friction: mu and mu2 are the static coefficient in two directions; {PHYSICS_FILE} has both.",
             *CANNOT_SAY,
             *_renamed(twin),
-            *lost_maps(twin),
+            *lost_texture_lines(twin),
         ),
         joints=True,
     )

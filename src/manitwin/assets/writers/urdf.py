@@ -21,7 +21,7 @@ from manitwin.assets.writers.mass_properties import (
     inertial_of_link,
     physics_file,
 )
-from manitwin.assets.writers.mesh_files import VisualPart, hull_files, lost_maps, visual_parts
+from manitwin.assets.writers.mesh_files import VisualPart, hull_files, lost_texture_lines, visual_parts
 from manitwin.formats.xml_file import add, document, new_element, number_text
 from manitwin.geometry.articulation import ArticulatedJoint
 from manitwin.robots.urdf import roll_pitch_yaw
@@ -51,14 +51,14 @@ def export(twin: TwinContent) -> Exported:
             "dynamic friction: PyBullet has one coefficient, given the static one, and multiplies those of two bodies.",
             "exact hulls: SAPIEN's loader drops corners within 0.7 mm of the hull of the others (PhysX's planeTolerance; "
             "`Twin.add_to_sapien` keeps them), PyBullet puts 1 mm around each hull (its collision margin).",
-            *_unsaid_limits(twin),
-            *lost_maps(twin),
+            *_missing_limit_lines(twin),
+            *lost_texture_lines(twin),
         ),
         joints=True,
     )
 
 
-def _unsaid_limits(twin: TwinContent) -> list[str]:
+def _missing_limit_lines(twin: TwinContent) -> list[str]:
     if all(None not in (joint.effort, joint.velocity) for joint in twin.record.joints):
         return []
     limits = f"{NO_EFFORT_LIMIT:g} and {NO_VELOCITY_LIMIT:g}"

@@ -55,7 +55,7 @@ def define_links(
     for place, link in enumerate(links):
         body = UsdGeom.Xform.Define(stage, scope.AppendChild(unique_name(stage, scope, link.name)))
         body.AddTranslateOp().Set(Gf.Vec3d(*origins[place].tolist()))
-        _say_name(body.GetPrim(), link.name)
+        _set_display_name(body.GetPrim(), link.name)
         bodies.append(body.GetPath())
         _define_body(body.GetPrim(), inertial_of_link(twin, link), origins[place])
         parts = [part for part, of in zip(twin.visual, twin.link_of_visual, strict=True) if of == place]
@@ -67,7 +67,7 @@ def define_links(
         _define_joint(stage, made, joint, [bodies[end] for end in ends], [origins[end] for end in ends])
 
 
-def _say_name(prim: Usd.Prim, name: str) -> None:
+def _set_display_name(prim: Usd.Prim, name: str) -> None:
     """Set the display name of a prim whose name is not a valid USD identifier."""
     if prim.GetName() != name:
         prim.SetDisplayName(name)
@@ -125,7 +125,7 @@ def _define_joint(
         made.CreateLowerLimitAttr(joint.lower / unit)
         made.CreateUpperLimitAttr(joint.upper / unit)
     prim = made.GetPrim()
-    _say_name(prim, joint.name)
+    _set_display_name(prim, joint.name)
     if joint.damping or joint.effort is not None:
         drive = UsdPhysics.DriveAPI.Apply(prim, UsdPhysics.Tokens.linear if slides else UsdPhysics.Tokens.angular)
         drive.CreateTypeAttr(UsdPhysics.Tokens.force)

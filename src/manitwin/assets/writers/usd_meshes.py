@@ -24,7 +24,7 @@ def define_visual(
     """
     name = unique_name(stage, scope, str(part.metadata.get("name") or "part"))
     mesh = UsdGeom.Mesh.Define(stage, scope.AppendChild(name))
-    points, welded = _one_point_a_place(np.asarray(part.vertices - origin_m, dtype=np.float32))
+    points, welded = _weld_positions(np.asarray(part.vertices - origin_m, dtype=np.float32))
     corners = np.asarray(part.faces)
     corners = corners[_has_three_points(welded[corners])]
     write_topology(mesh, points, welded[corners])
@@ -37,7 +37,7 @@ def define_visual(
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(materials.of(source))
 
 
-def _one_point_a_place(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _weld_positions(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return distinct positions in order of first use, and the index of the position of every vertex ``(V,)``."""
     positions = positions + np.float32(0)  # avoids negative zeros
     _, first, inverse = np.unique(positions, axis=0, return_index=True, return_inverse=True)
@@ -65,7 +65,7 @@ def _write_normals(
 
 
 def _write_texture_coordinates(mesh: UsdGeom.Mesh, uv: np.ndarray, corners: np.ndarray) -> None:
-    places, inverse = _one_point_a_place(np.asarray(uv, dtype=np.float32)[corners.reshape(-1)])
+    places, inverse = _weld_positions(np.asarray(uv, dtype=np.float32)[corners.reshape(-1)])
     primvar = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
         "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
     )

@@ -14,7 +14,7 @@ from manitwin.assets.writers.registry import exporter
 from manitwin.errors import ExportError
 from manitwin.formats.markdown import markdown_escaped
 from manitwin.twin.record_values import Estimate
-from manitwin.twin.store import folder_beside
+from manitwin.twin.store import atomic_folder
 
 MAX_NAME = 255
 """Largest file name in bytes on ext4, APFS and NTFS."""
@@ -64,7 +64,7 @@ def write_exported(exported: Exported, folder: Path) -> Path:
     if len({name.casefold() for name in names}) < len(names):
         raise ExportError(f"{folder}: two file names differ in case only; not every file system keeps both")
     try:
-        with folder_beside(folder) as fresh:
+        with atomic_folder(folder) as fresh:
             for name, data in sorted(exported.files.items()):
                 place = fresh / names[name]
                 place.parent.mkdir(parents=True, exist_ok=True)
@@ -101,11 +101,11 @@ def readme(twin: TwinContent, format_name: str, exported: Exported) -> str:
         "",
         f"{caption} Open `{exported.main}`. SI units; lengths are in metres in the files themselves, nothing is scaled.",
         "",
-        *_what_is_said(twin, notes),
+        *_quantity_lines(twin, notes),
         "",
         "## What these files cannot say",
         "",
-        *[f"- {line}" for line in exported.cannot_say or (_nothing_left_out(notes),)],
+        *[f"- {line}" for line in exported.cannot_say or (_no_omissions_line(notes),)],
         "",
         *_how_to_load(twin, notes, exported),
         "## Licence",
@@ -117,12 +117,12 @@ def readme(twin: TwinContent, format_name: str, exported: Exported) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _nothing_left_out(notes: FormatNotes) -> str:
+def _no_omissions_line(notes: FormatNotes) -> str:
     told = UNTOLD not in notes.says.values()
     return "nothing that the twin knows of its physics." if told else f"{UNTOLD}."
 
 
-def _what_is_said(twin: TwinContent, notes: FormatNotes) -> list[str]:
+def _quantity_lines(twin: TwinContent, notes: FormatNotes) -> list[str]:
     physical, inertial = twin.physical, inertial_of(twin)
     moments = ", ".join(f"{moment:.4g}" for moment in sorted(inertial.principal_moments_kg_m2))
     sizes = " x ".join(f"{side:.4g}" for side in physical.extents_m)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import out_console
 
 if TYPE_CHECKING:
@@ -16,16 +16,24 @@ if TYPE_CHECKING:
 
 def affordances(
     dataset: Annotated[
-        str, options.existing("A data set, or a folder of twins.", "DATASET", "a data set, or a folder of twins")
+        str,
+        options.existing_path_argument(
+            "A data set, or a folder of twins.", "DATASET", "a data set, or a folder of twins"
+        ),
     ],
     out: Annotated[Path, options.output_folder("The folder to write; it must be new or empty.")],
     points: Annotated[
         int,
-        typer.Option(help="Number of points on the surface of a twin.", callback=choices.count_of("--points", 100_000)),
+        typer.Option(
+            help="Number of points on the surface of a twin.",
+            callback=option_values.count_callback("--points", 100_000),
+        ),
     ] = 2048,
     trials: Annotated[
         int,
-        typer.Option(help="Number of grasps to try for the grasp map.", callback=choices.count_of("--trials", 10_000)),
+        typer.Option(
+            help="Number of grasps to try for the grasp map.", callback=option_values.count_callback("--trials", 10_000)
+        ),
     ] = 200,
     seed: Annotated[int, typer.Option(help="Random seed.", min=0, max=2**63 - 1)] = 0,
     gripper: options.OwnGrippers = None,

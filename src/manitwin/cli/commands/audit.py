@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import err_console, write_json, write_text
 from manitwin.cli.output_file import write_output
 from manitwin.errors import UsageError
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 def audit(
     paths: Annotated[
-        list[Path] | None, options.existing("Assets, or folders of assets.", "PATH...", "an asset, or a folder of them")
+        list[Path] | None,
+        options.existing_path_argument("Assets, or folders of assets.", "PATH...", "an asset, or a folder of them"),
     ] = None,
     select: Annotated[
         str | None, typer.Option(help="Check only these rules: codes or prefixes of codes.", metavar="A,B")
@@ -28,17 +29,19 @@ def audit(
     ignore: Annotated[str | None, typer.Option(help="Skip these rules.", metavar="A,B")] = None,
     format: Annotated[
         str,
-        choices.AUDIT_FORMATS.option("--format", "-f", help="Output format: text, json or sarif.", metavar="FORMAT"),
+        option_values.AUDIT_FORMATS.option(
+            "--format", "-f", help="Output format: text, json or sarif.", metavar="FORMAT"
+        ),
     ] = "text",
     engines: Annotated[
         str | None,
-        choices.AUDIT_ENGINES.option(
+        option_values.AUDIT_ENGINES.option(
             help="Also drop each asset in these engines: mujoco, sapien, pybullet.", metavar="A,B"
         ),
     ] = None,
     engine: Annotated[
         str | None,
-        choices.AUDIT_ENGINE.option(
+        option_values.AUDIT_ENGINE.option(
             help="Judge collision geometry as this engine loads it: mujoco, pybullet, sapien, physx or gazebo.",
             metavar="ENGINE",
         ),
@@ -84,8 +87,8 @@ def audit(
         audited.append(each)
         if format == "text":
             _write_text(each, len(assets) > 1)
-    _say_left_alone(fragments, templates)
-    _write_end(audited, rules, format)
+    _print_skipped_files(fragments, templates)
+    _write_summary(audited, rules, format)
     if html is not None:
         _write_page(audited, rules, html, paths)
     if write_baseline is not None:
@@ -101,7 +104,7 @@ def _explain(code: str) -> None:
     write_text(explanation(rule_of(code)) + "\n")
 
 
-def _say_left_alone(fragments: Sequence[Path], templates: Sequence[Path]) -> None:
+def _print_skipped_files(fragments: Sequence[Path], templates: Sequence[Path]) -> None:
     if fragments:
         err_console.print(
             f"{len(fragments)} descriptions without a shape, or layers of others, are no assets and were left alone"
@@ -142,7 +145,7 @@ def _write_page(audited: Sequence[Audited], rules: Sequence[RuleText], file: Pat
     err_console.print(f"{file}: page of all findings")
 
 
-def _write_end(audited: Sequence[Audited], rules: Sequence[RuleText], format: str) -> None:
+def _write_summary(audited: Sequence[Audited], rules: Sequence[RuleText], format: str) -> None:
     from manitwin.assets.audit.report import MANY, digest, json_of, sarif_of, shared_text, summary
 
     if format == "text":

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from manitwin.cli import choices, options
-from manitwin.cli.arguments import degrees_of
+from manitwin.cli import option_values, options
+from manitwin.cli.arguments import parse_azimuths_deg
 from manitwin.cli.causes import print_causes
 from manitwin.cli.console import err_console, error_console, out_console, print_error, print_estimate
 from manitwin.cli.documents import Json, print_document
 from manitwin.cli.interrupt import WATCH
-from manitwin.formats.installation import left_out, put_off
+from manitwin.formats.installation import block_import, defer_import
 
 if TYPE_CHECKING:
     from manitwin.engine.drive import ExecutorName
@@ -39,7 +39,7 @@ RUN_RENAMED = "`manitwin run` is deprecated and will be removed in the next vers
 def build(
     inputs: Annotated[
         list[Path] | None,
-        options.existing(
+        options.existing_path_argument(
             "Images, meshes, folders, or .csv/.jsonl manifests; without any, resume the data set.",
             "INPUT",
             "an image, a mesh, a folder, or a .csv or .jsonl manifest; put the description of an object behind --text",
@@ -74,24 +74,24 @@ def build(
         _print_dry_run(inputs or [], out, arguments, said, as_json=json)
         return
     request = _request(inputs or [], out, arguments, said)
-    report, told = _watched_build(request, lines=lines, executor=cast("ExecutorName", executor), address=address)
+    report, told = _build_with_progress(request, lines=lines, executor=cast("ExecutorName", executor), address=address)
     _print_report(report, lines, told)
     if json:
-        from manitwin.cli.causes import causes_of
+        from manitwin.cli.causes import read_causes
         from manitwin.cli.documents import build_document
 
-        print_document(build_document(report, causes_of(out, report.run.given)))
+        print_document(build_document(report, read_causes(out, report.run.given)))
     raise typer.Exit(report.exit_code)
 
 
 def _turns(turns: str, inputs: list[Path], views: bool) -> Any:
     """Return the turns, or where a folder is among the inputs what makes them once it is listed."""
     if views and any(path.is_dir() for path in inputs):
-        return partial(degrees_of, turns)
-    return degrees_of(turns, len(inputs))
+        return partial(parse_azimuths_deg, turns)
+    return parse_azimuths_deg(turns, len(inputs))
 
 
-Dataset = Annotated[str, typer.Option("--dataset", "--out", "-o", callback=choices.folder_to_write)]
+Dataset = Annotated[str, typer.Option("--dataset", "--out", "-o", callback=option_values.check_output_folder)]
 
 
 @options.with_options({"out": (Dataset, "")})
@@ -114,12 +114,12 @@ def _print_dry_run(
 
 def _request(inputs: list[Path], out: str, arguments: dict[str, Any], said: dict[str, Any]) -> BuildRequest:
     """Check what was said; ``arguments`` are those of ``request_build``, ``said`` defaults of the inputs and flags."""
-    from manitwin.engine.process_bounds import one_thread_each
+    from manitwin.engine.process_limits import limit_library_threads
 
-    one_thread_each()  # before NumPy is loaded: with its threads this process could not be forked
-    put_off("networkx", "Graph")  # a tenth of the imports, which trimesh asks for and few things use
-    put_off("collada")  # a twentieth, which reads one format of many
-    put_off("cascadio")  # 32 MB in each worker: what reads STEP runs in a process of its own
+    limit_library_threads()  # before NumPy is loaded: with its threads this process could not be forked
+    defer_import("networkx", "Graph")  # a tenth of the imports, which trimesh asks for and few things use
+    defer_import("collada")  # a twentieth, which reads one format of many
+    defer_import("cascadio")  # 32 MB in each worker: what reads STEP runs in a process of its own
     gc.disable()  # imports leave next to nothing to be collected, and a twentieth of their time went into looking for it
     try:
         from manitwin.pipeline.settings import Flags, request_build
@@ -131,15 +131,15 @@ def _request(inputs: list[Path], out: str, arguments: dict[str, Any], said: dict
         gc.enable()
 
 
-def _watched_build(
+def _build_with_progress(
     request: BuildRequest, *, lines: bool, executor: ExecutorName, address: str | None
 ) -> tuple[BuildReport, int]:
     """Build while a person watches; returns the report, and how many of its remarks were told as the work began."""
-    from manitwin.cli.progress import WatchedRun
+    from manitwin.cli.progress import RunDisplay
     from manitwin.dataset.build import build_requested
     from manitwin.engine.fork_server import forked_workers
     from manitwin.engine.stage import INPUT
-    from manitwin.render.device import looked_for_once, require_driver, require_renderer
+    from manitwin.render.device import require_driver, require_renderer, share_device_search
 
     if executor == "inline":
         require_renderer()
@@ -167,16 +167,16 @@ def _watched_build(
             require_device_once()
 
     def ended(result: ItemResult) -> None:
-        watched.progress.ended(result.item, result.status, result.reused)
+        watched.progress.record_ended(result.item, result.status, result.reused)
         if not result.reused:
             require_device_once()
         if lines:
             _print_result(result)
 
     forked = forked_workers(OF_WORKERS, [WATCH]) if executor == "local" else nullcontext()
-    watch = WatchedRun("inputs", request.out, lambda: request.notes.under_way)
+    watch = RunDisplay("inputs", request.out, lambda: request.notes.under_way)
     # pandas is 30 MB in each worker that Arrow takes where it finds it; forked before threads show how far it is
-    with left_out("pandas"), looked_for_once(), forked, watch as watched:
+    with block_import("pandas"), share_device_search(), forked, watch as watched:
         report = build_requested(
             request, executor=executor, address=address, on_estimate=print_estimate, on_start=started, on_stage=staged,
             on_result=ended,

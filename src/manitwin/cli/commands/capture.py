@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import out_console
 
 
@@ -18,7 +18,7 @@ def capture(
         typer.Option(
             help="Folder of a drawn scene to use instead of a camera; sensor noise is added to its depth.",
             metavar="SCENE",
-            callback=choices.must_exist("a scene's folder"),
+            callback=option_values.existing_path_callback("a scene's folder"),
         ),
     ] = None,
     camera: Annotated[str, typer.Option(help="With --scene: which camera of the scene.")] = "oblique",
@@ -30,7 +30,7 @@ def capture(
         typer.Option(
             help="Recording of a RealSense camera (.bag) to use instead of a camera.",
             metavar="FILE",
-            callback=choices.must_exist("a recorded .bag"),
+            callback=option_values.existing_path_callback("a recorded .bag"),
         ),
     ] = None,
     serial: Annotated[
@@ -39,14 +39,14 @@ def capture(
 ) -> None:
     """Save a frame of a RealSense camera for manitwin locate --view, or simulate one from a drawn scene."""
     from manitwin.errors import UsageError
-    from manitwin.scenes.locate.captured import write_capture
-    from manitwin.scenes.locate.realsense import record, sdk
-    from manitwin.scenes.locate.rehearsed_capture import capture_of_scene
+    from manitwin.scenes.locate.capture_folder import write_capture
+    from manitwin.scenes.locate.realsense import capture_view, sdk
+    from manitwin.scenes.locate.simulated_capture import capture_of_scene
 
     given = [name for name, each in (("--scene", scene), ("--bag", bag), ("--serial", serial)) if each is not None]
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)} name different sources; give only one")
-    seen = record(sdk(), bag=bag, serial=serial) if scene is None else capture_of_scene(scene, camera, seed)
+    seen = capture_view(sdk(), bag=bag, serial=serial) if scene is None else capture_of_scene(scene, camera, seed)
     write_capture(out, seen)
     height, width = seen.depth_m.shape
     share = float((seen.depth_m > 0).mean())

@@ -9,14 +9,14 @@ from typing import Annotated
 import typer
 
 from manitwin.cli import options
-from manitwin.cli.arguments import degrees_of
+from manitwin.cli.arguments import parse_azimuths_deg
 from manitwin.cli.console import err_console, out_console
 
 
 def carve(
     paths: Annotated[
         list[Path],
-        options.existing(
+        options.existing_path_argument(
             "Photos of one object, or their folder: of a turntable, or taken from the height of the object.",
             "PHOTO...",
             "two photos or more of one object, or their folder",
@@ -55,13 +55,13 @@ def carve(
     if why is not None:
         raise UsageError(f"--name: {why}")
     photos = listed_views(paths, poses)
-    turns_deg = None if turns is None else degrees_of(turns, len(photos))
+    turns_deg = None if turns is None else parse_azimuths_deg(turns, len(photos))
     made = carve_photos(photos, turns_deg, name, poses=poses, up=up, units=units)
     carved = made.carved
     for finding in made.findings:
         err_console.print(finding)
     write_bytes_atomically(out, write_glb([made.part]))
-    filled = ", ".join(f"{o.name} {share:.0%}" for o, share in zip(carved.outlines, carved.covered, strict=True))
+    filled = ", ".join(f"{o.name} {share:.0%}" for o, share in zip(carved.photos, carved.covered_shares, strict=True))
     said = f" --name {quote(name)}" if name else ""
     unit = " --units m" if made.metric else ""
     out_console.print(f"{out}: {len(carved.surface.faces)} faces; of each outline it fills {filled}")

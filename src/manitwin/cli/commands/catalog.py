@@ -12,7 +12,9 @@ from manitwin.cli.console import out_console
 
 
 def catalog(
-    dataset: Annotated[str, options.existing("A data set with an index.", "DATASET", "the folder of a data set")],
+    dataset: Annotated[
+        str, options.existing_path_argument("A data set with an index.", "DATASET", "the folder of a data set")
+    ],
     out: Annotated[Path, options.output_folder("The folder to write; it must be new or empty.")],
     size_px: Annotated[
         int, typer.Option("--size", help="Width and height of the pictures, in pixels.", min=32, max=2048)

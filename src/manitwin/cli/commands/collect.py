@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import error_console, out_console
 from manitwin.cli.documents import Json, print_document
 
@@ -20,7 +20,7 @@ def collect_add(
     ],
     inputs: Annotated[
         list[Path],
-        options.existing(
+        options.existing_path_argument(
             "Folders of photos and meshes, and lists of files and URLs.",
             "FOLDER|LIST.csv|LIST.jsonl...",
             "a folder, or a .csv or .jsonl list",
@@ -49,15 +49,15 @@ def collect_add(
     ] = False,
 ) -> None:
     """Add photos, meshes and URLs to a catalogue, each once; report unreadable files by cause and count."""
-    from manitwin.dataset.collect.places import require_place
+    from manitwin.dataset.collect.place_check import require_place
 
     for place in inputs:
         require_place(place, source, root)
-    from manitwin.dataset.collect.intake import Given, add
+    from manitwin.dataset.collect.intake import DefaultValues, add_inputs
 
-    given = Given(source=source, licence=licence, attribution=attribution, name=category)
+    given = DefaultValues(source=source, licence=licence, attribution=attribution, name=category)
     for place in inputs:
-        done = add(catalogue, place, given, root)
+        done = add_inputs(catalogue, place, given, root)
         told = f"{place}: {done.entries:,} entries: {done.new:,} new, {done.changed:,} changed, {done.unchanged:,} unchanged"
         told += f", {done.repeated:,} listed twice" if done.repeated else ""
         told += f"; {done.parts:,} files are parts of meshes" if done.parts else ""
@@ -71,15 +71,17 @@ def collect_add(
                 f"  and {len(lines) - _CAUSES_SHOWN} more causes: `manitwin collect status {catalogue}`"
             )
     if alike:
-        from manitwin.dataset.collect.alike import mark_alike
+        from manitwin.dataset.collect.near_duplicates import mark_near_duplicates
 
-        found = mark_alike(catalogue)
+        found = mark_near_duplicates(catalogue)
         counted = ", ".join(f"{count:,} by {by}" for by, count in found.items())
         out_console.print(f"{sum(found.values()):,} look like an earlier input: {counted}")
 
 
 def collect_status(
-    catalogue: Annotated[Path, options.existing("A catalogue.", "CATALOGUE", "a catalogue that collect add made")],
+    catalogue: Annotated[
+        Path, options.existing_path_argument("A catalogue.", "CATALOGUE", "a catalogue that collect add made")
+    ],
     json_: Json = False,
 ) -> None:
     """Summarise a catalogue: rows by group, status, licence, source and size, and unreadable files."""
@@ -94,11 +96,15 @@ def collect_status(
 
 
 def collect_plan(
-    catalogue: Annotated[Path, options.existing("A catalogue.", "CATALOGUE", "a catalogue that collect add made")],
+    catalogue: Annotated[
+        Path, options.existing_path_argument("A catalogue.", "CATALOGUE", "a catalogue that collect add made")
+    ],
     out: Annotated[Path, options.output_folder("The folder to write the plan into.")],
     items: Annotated[
         int,
-        typer.Option(help="Number of twins to build.", callback=choices.count_of("--items", 10_000_000), metavar="N"),
+        typer.Option(
+            help="Number of twins to build.", callback=option_values.count_callback("--items", 10_000_000), metavar="N"
+        ),
     ] = 1000,
     seed: Annotated[int, typer.Option(help="Random seed of the choice.", min=0, max=options.LARGEST_SEED)] = 1,
     license: Annotated[
@@ -139,7 +145,7 @@ def collect_plan(
 def collect_draw(
     prompts: Annotated[
         Path,
-        options.existing(
+        options.existing_path_argument(
             "A plan's folder, or a CSV of texts and names.", "PLAN|PROMPTS.csv", "a plan that collect plan made"
         ),
     ],
@@ -158,7 +164,7 @@ def collect_draw(
 ) -> None:
     """Generate a picture for each prompt of a plan with a text-to-image model; rerun the command to resume."""
     from manitwin.config import BuildConfig, load_config
-    from manitwin.dataset.collect.drawing import ANSWERS, MANIFEST, draw_pictures, read_prompts
+    from manitwin.dataset.collect.text_to_image import ANSWERS, MANIFEST, draw_pictures, read_prompts
 
     settings = BuildConfig() if config is None else load_config(config)
     if max_cost_usd is not None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import out_console
 from manitwin.errors import ManiTwinError, UsageError
 from manitwin.formats.installation import missing_libraries, package_by_policy
@@ -38,7 +38,7 @@ MIN_FREE_GB = 2
 
 
 @dataclass(frozen=True)
-class Examined:
+class CheckResult:
     """The result of one check of this installation: ``name`` is what was checked."""
 
     name: str
@@ -53,20 +53,21 @@ KINDS = {"vlm": "annotator", "generator": "generator", "grasper": "grasper"}
 def doctor(
     what: Annotated[
         str | None,
-        choices.SERVED_KINDS.argument(
+        option_values.SERVED_KINDS.argument(
             help="vlm, generator or grasper: send one small request to this service; default: check this machine."
         ),
     ] = None,
     vlm: Annotated[
         str | None,
-        choices.ANNOTATORS.option(help="VLM to test (openai:MODEL@URL); default: the one in the configuration."),
+        option_values.ANNOTATORS.option(help="VLM to test (openai:MODEL@URL); default: the one in the configuration."),
     ] = None,
     generator: Annotated[
-        str | None, choices.GENERATORS.option(help="Generator to test (rodin); default: the one in the configuration.")
+        str | None,
+        option_values.GENERATORS.option(help="Generator to test (rodin); default: the one in the configuration."),
     ] = None,
     grasper: Annotated[
         str | None,
-        choices.GRASPERS.option(
+        option_values.GRASPERS.option(
             help="Grasper to test (graspgen@tcp://HOST:5556); default: the one in the configuration."
         ),
     ] = None,
@@ -81,36 +82,36 @@ def doctor(
                 f"doctor without an argument checks this machine and takes no options; to test a service, give one of"
                 f" {', '.join(KINDS)} before the options"
             )
-        findings, wrong = examine(), "missing"
+        findings, wrong = check_installation(), "missing"
     else:
         from manitwin.config import BuildConfig, load_config
 
         settings = load_config(config) if config else BuildConfig()
         wrong = "failed "
-        findings = [asked(KINDS[what], specs[what] or getattr(settings, KINDS[what]), settings)]
+        findings = [probe_backend(KINDS[what], specs[what] or getattr(settings, KINDS[what]), settings)]
     for finding in findings:
         out_console.print(f"{'ok     ' if finding.ok else wrong} {finding.name}: {finding.detail}")
     raise typer.Exit(0 if all(finding.ok for finding in findings) else 4)
 
 
-def asked(kind: str, spec: str, settings: BuildConfig) -> Examined:
+def probe_backend(kind: str, spec: str, settings: BuildConfig) -> CheckResult:
     """Send one small request to the backend of a spec: what works, what it cost and how long it took.
 
     No remembered answer is taken for one, and none is remembered. Raises UsageError for a name that no backend has, and for
     a backend that cannot be asked as it was given: its address, its key, its options.
     """
-    from manitwin.engine.charges import counted
+    from manitwin.engine.charges import record_charges
     from manitwin.models.registry import create, target
 
     target(kind, spec)
     services = settings.services.model_copy(update={"cache": False, "record": None})
     settings = settings.model_copy(update={"services": services})
     started = time.perf_counter()
-    with counted() as bill:
+    with record_charges() as bill:
         try:
             backend = create(kind, spec, settings)
             if not hasattr(backend, "probe"):
-                return Examined(spec, True, "built in, no service to test")
+                return CheckResult(spec, True, "built in, no service to test")
             works, ok = backend.probe(), True
         except UsageError:
             raise
@@ -118,10 +119,10 @@ def asked(kind: str, spec: str, settings: BuildConfig) -> Examined:
             works, ok = str(error), False
     seconds = time.perf_counter() - started
     works += "; it is a rehearsal server, not a model" if bill.rehearsed else ""
-    return Examined(spec, ok, f"{' '.join(works.split())} ({bill.usd:.4f} USD, {seconds:.1f} s)")
+    return CheckResult(spec, ok, f"{' '.join(works.split())} ({bill.usd:.4f} USD, {seconds:.1f} s)")
 
 
-def examine() -> list[Examined]:
+def check_installation() -> list[CheckResult]:
     """Look at Python, the packages, what they want of the system, physics, the renderer, the backends and the disk."""
     looks: tuple[tuple[str, Callable[[], str]], ...] = (
         ("python", _python),
@@ -135,14 +136,14 @@ def examine() -> list[Examined]:
         ("backends", _backends),
         ("disk", _disk),
     )
-    return [_look(name, look) for name, look in looks]
+    return [_run_check(name, look) for name, look in looks]
 
 
-def _look(name: str, look: Callable[[], str]) -> Examined:
+def _run_check(name: str, look: Callable[[], str]) -> CheckResult:
     try:
-        return Examined(name, True, look())
+        return CheckResult(name, True, look())
     except (ManiTwinError, ImportError, RuntimeError, OSError) as error:
-        return Examined(name, False, " ".join(str(error).split()))
+        return CheckResult(name, False, " ".join(str(error).split()))
 
 
 def _python() -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import error_console, out_console
 from manitwin.cli.documents import Json, print_document
 
@@ -21,15 +21,21 @@ OPTIONS = {"annotations": {"--labels"}, "generation": {"--clip", "--ulip", "--ou
 
 
 def _model(help: str) -> Any:
-    return typer.Option(help=help, metavar="FOLDER", callback=choices.must_exist("a model's folder of ONNX files"))
+    return typer.Option(
+        help=help, metavar="FOLDER", callback=option_values.existing_path_callback("a model's folder of ONNX files")
+    )
 
 
 def evaluate(
     what: Annotated[
-        str, choices.EVALUATIONS.argument(help="What to evaluate: annotations, generation or grasps.", metavar="WHAT")
+        str,
+        option_values.EVALUATIONS.argument(help="What to evaluate: annotations, generation or grasps.", metavar="WHAT"),
     ],
     dataset: Annotated[
-        str, options.existing("A data set, or a folder of twins.", "DATASET", "a data set, or a folder of twins")
+        str,
+        options.existing_path_argument(
+            "A data set, or a folder of twins.", "DATASET", "a data set, or a folder of twins"
+        ),
     ],
     labels: Annotated[
         Path | None,
@@ -37,7 +43,7 @@ def evaluate(
             "--labels",
             help="annotations: ground-truth labels, one row per object (docs/evaluation.md).",
             metavar="LABELS.csv",
-            callback=choices.must_exist("a CSV file of labels"),
+            callback=option_values.existing_path_callback("a CSV file of labels"),
         ),
     ] = None,
     clip: Annotated[
@@ -45,7 +51,7 @@ def evaluate(
         typer.Option(
             help="generation: CLIP model for CLIP(N-I/T) and CLIP(I-I/T): a folder of ONNX files, or MODEL@http://HOST:PORT.",
             metavar="FOLDER|SERVER",
-            callback=choices.must_exist("a model's folder of ONNX files, or MODEL@http://HOST:PORT"),
+            callback=option_values.existing_path_callback("a model's folder of ONNX files, or MODEL@http://HOST:PORT"),
         ),
     ] = None,
     ulip: Annotated[Path | None, _model("generation: ULIP model with a point cloud encoder, for ULIP-I/T.")] = None,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices, options
-from manitwin.cli.console import err_console, note_old_layout, out_console, print_error
+from manitwin.cli import option_values, options
+from manitwin.cli.console import err_console, out_console, print_error, print_layout_notice
 from manitwin.formats.plurals import counted
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def export(
     twins: Annotated[
         list[str],
-        options.existing(
+        options.existing_path_argument(
             "Twin folders, folders of twins, data sets (a folder or URL); or scenes of `manitwin layout`.",
             "TWIN|SCENE",
             "a folder that manitwin has built",
@@ -29,7 +29,7 @@ def export(
     ],
     out: Annotated[Path, options.output_folder("The folder to write OUT/<twin>/<format>/ into.")],
     to: Annotated[
-        str, choices.EXPORT_FORMATS.option(help="Formats separated by commas (mjcf,urdf,sdf,usd,...), or all.")
+        str, option_values.EXPORT_FORMATS.option(help="Formats separated by commas (mjcf,urdf,sdf,usd,...), or all.")
     ] = "all",
     license_allow: Annotated[
         str | None,
@@ -101,7 +101,7 @@ def twin_folders(given: list[str]) -> Iterator[Path]:
     seen = set[Path]()
     for each in given:
         root, found = DatasetRoot(each), False
-        note_old_layout(root)
+        print_layout_notice(root)
         for folder in _local_twins(root.local) if root.local is not None else ():
             found = True
             if folder.resolve() not in seen:

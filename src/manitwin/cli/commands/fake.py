@@ -7,15 +7,15 @@ from typing import Annotated
 
 import typer
 
-from manitwin.cli import choices
-from manitwin.cli.choices import LARGEST_COUNT
+from manitwin.cli import option_values
 from manitwin.cli.console import out_console
-from manitwin.cli.interrupt import until_interrupted
+from manitwin.cli.interrupt import wait_for_interrupt
+from manitwin.cli.option_values import LARGEST_COUNT
 
 
 def fake(
     name: Annotated[
-        str | None, choices.REHEARSALS.argument(help="Service to stand in for: openai, rodin, graspgen ...")
+        str | None, option_values.REHEARSALS.argument(help="Service to stand in for: openai, rodin, graspgen ...")
     ] = None,
     port: Annotated[int, typer.Option(help="Port; 0: any free port.", min=0, max=65535)] = 0,
     fault: Annotated[
@@ -43,7 +43,7 @@ def fake(
         raise UsageError(f"no service given; give one of {', '.join(REHEARSALS)}")
     given = Faults.parse(fault or [])
     # an interrupt that was raised inside of a line's printing would print that line again
-    with until_interrupted((signal.SIGINT,)) as wait:
+    with wait_for_interrupt((signal.SIGINT,)) as wait:
         with serving(name, port=port, faults=given, key=key, polls=polls) as server:
             out_console.print(f"{name} at {server.url}, until interrupted (Ctrl-C)")
             if server.key_variable is not None:

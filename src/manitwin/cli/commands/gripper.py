@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices
+from manitwin.cli import option_values
 from manitwin.cli.console import out_console
 from manitwin.cli.documents import Json, print_document
 from manitwin.cli.output_file import write_output
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def gripper(
     name: Annotated[
-        str, choices.GRIPPERS.argument(help="Name of a shipped gripper, or a .toml file.", metavar="GRIPPER")
+        str, option_values.GRIPPERS.argument(help="Name of a shipped gripper, or a .toml file.", metavar="GRIPPER")
     ],
     draw: Annotated[
         Path | None,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import err_console, out_console, print_error
 from manitwin.cli.output_file import write_output
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 def import_(
     paths: Annotated[
         list[Path],
-        options.existing(
+        options.existing_path_argument(
             "Assets: files, folders, or folders of them.", "PATH...", "an asset's file or folder, or a folder of assets"
         ),
     ],
     out: Annotated[Path, options.output_folder("The folder to write imported assets into.")],
     format: Annotated[
         str,
-        choices.IMPORT_FORMATS.option(
+        option_values.IMPORT_FORMATS.option(
             "--from",
             help="Format: auto, robotwin, manitwin100k, embodiedgen, urdf, mjcf, sdf, usd, gso or twin.",
             metavar="FORMAT",
@@ -49,7 +49,7 @@ def import_(
         typer.Option(
             help="Read no files above this folder; default: the repository, package or folder of the asset.",
             metavar="FOLDER",
-            callback=choices.must_exist("a folder that the assets lie in"),
+            callback=option_values.existing_path_callback("a folder that the assets lie in"),
         ),
     ] = None,
     report: Annotated[
@@ -62,7 +62,7 @@ def import_(
 ) -> None:
     """Import assets of other tools, keep their annotations, and report what is missing."""
 
-    from manitwin.assets.importers.importer import import_assets, kept_words
+    from manitwin.assets.importers.importer import import_assets, kept_properties
 
     done = there = same = failed = 0
     first: dict[str, Path] = {}
@@ -89,7 +89,7 @@ def import_(
             continue
         done += 1
         record = imported.record
-        kept = ", ".join(kept_words(record)) or "the mesh only"
+        kept = ", ".join(kept_properties(record)) or "the mesh only"
         missing = f"; missing {', '.join(record.missing)}" if record.missing else ""
         out_console.print(f"{imported.folder.name}: {record.format}; kept {kept}{missing}")
         for reason in record.dropped:

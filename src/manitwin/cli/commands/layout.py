@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from manitwin.cli import choices, options
-from manitwin.cli.causes import causes_of, print_causes
+from manitwin.cli import option_values, options
+from manitwin.cli.causes import print_causes, read_causes
 from manitwin.cli.console import err_console, out_console, print_error
 from manitwin.cli.documents import Json, print_document
 
@@ -20,18 +20,20 @@ if TYPE_CHECKING:
 def layout(
     dataset: Annotated[
         str,
-        options.existing(
+        options.existing_path_argument(
             "A data set, or a folder of twins.", "DATASET", "a data set, or the folder that manitwin build wrote"
         ),
     ],
     out: Annotated[str, options.output_folder("The folder to write scenes into.")],
-    count: Annotated[int, typer.Option("-n", help="Number of layouts.", callback=choices.count_of("-n"))] = 100,
+    count: Annotated[
+        int, typer.Option("-n", help="Number of layouts.", callback=option_values.count_callback("-n"))
+    ] = 100,
     objects: Annotated[
         str | None, typer.Option(help="Number of objects per layout: LOW..HIGH.", metavar="LOW..HIGH")
     ] = None,
-    surface: Annotated[str | None, choices.SURFACES.option(help="Surface: table, shelf or tray.")] = None,
+    surface: Annotated[str | None, option_values.SURFACES.option(help="Surface: table, shelf or tray.")] = None,
     clutter: Annotated[
-        str | None, choices.CLUTTER.option(help="Density of the objects: sparse, medium or dense.")
+        str | None, option_values.CLUTTER.option(help="Density of the objects: sparse, medium or dense.")
     ] = None,
     include: Annotated[
         list[str] | None,
@@ -47,7 +49,7 @@ def layout(
         bool, typer.Option("--upright", help="Place objects upright if they have a stable upright placement.")
     ] = False,
     robot: Annotated[
-        str | None, choices.ROBOTS.option(help="Place objects within the workspace of this robot.")
+        str | None, option_values.ROBOTS.option(help="Place objects within the workspace of this robot.")
     ] = None,
     pictures: Annotated[
         bool,
@@ -70,9 +72,9 @@ def layout(
     chosen = {name: value for name, value in given.items() if value is not None}
     settings = options.read_settings(LayoutsConfig, run, {"pictures": pictures or None, "layout": chosen})
     from manitwin.api import make_layouts
-    from manitwin.cli.progress import WatchedRun
-    from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET, layout_totals, without_upright
-    from manitwin.scenes.layouts.pool import pool_of
+    from manitwin.cli.progress import RunDisplay
+    from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET, layout_totals, twins_without_upright
+    from manitwin.scenes.layouts.pool import cached_pool
     from manitwin.twin.dataset_root import DatasetRoot
 
     sheet = sheet or settings.pictures or DatasetRoot(out).exists(CONTACT_SHEET)  # one that is there is kept up to date
@@ -80,14 +82,16 @@ def layout(
         from manitwin.render.device import require_renderer
 
         require_renderer()
-    with WatchedRun("layouts", out) as watched:
-        report = make_layouts(dataset, out, count, config=settings, **options.placed(run), **watched.callbacks)
+    with RunDisplay("layouts", out) as watched:
+        report = make_layouts(
+            dataset, out, count, config=settings, **options.executor_settings(run), **watched.callbacks
+        )
     for remark in report.remarks:
         err_console.print(remark)
     totals = layout_totals(out)
-    if settings.layout.upright and (lying := without_upright(dataset)):
+    if settings.layout.upright and (lying := twins_without_upright(dataset)):
         out_console.print(f"twins without an upright placement, placed in another resting pose: {len(lying)}")
-    if said := pool_of(DatasetRoot(dataset).absolute()).about_joints:
+    if said := cached_pool(DatasetRoot(dataset).absolute()).joints_remark:
         out_console.print(said)
     _print_totals(totals)
     if sheet and totals.accepted:
@@ -101,7 +105,7 @@ def layout(
     if json:
         from manitwin.cli.documents import layouts_document
 
-        print_document(layouts_document(report, out, causes_of(out), totals))
+        print_document(layouts_document(report, out, read_causes(out), totals))
     raise typer.Exit(report.exit_code)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import error_console
 from manitwin.cli.documents import Json, print_document
 from manitwin.cli.location_lines import print_frames, print_grasps, print_layout, print_size, print_thing
@@ -17,17 +17,17 @@ from manitwin.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from manitwin.scenes.locate.recognition import Thing
+    from manitwin.scenes.locate.recognition import ViewedObject
 
 
 def _file(help: str, remedy: str) -> Any:
-    return typer.Option(help=help, metavar="FILE", callback=choices.must_exist(remedy))
+    return typer.Option(help=help, metavar="FILE", callback=option_values.existing_path_callback(remedy))
 
 
 def locate(
     source: Annotated[
         Path,
-        options.existing(
+        options.existing_path_argument(
             "The twin to look for, or a data set of twins.", "TWIN|DATASET", "a twin's folder or a data set"
         ),
     ],
@@ -37,7 +37,7 @@ def locate(
             "--view",
             help="Folder written by manitwin capture, in place of --depth, --camera, --rgb and --base.",
             metavar="FOLDER",
-            callback=choices.must_exist("a folder that manitwin capture wrote"),
+            callback=option_values.existing_path_callback("a folder that manitwin capture wrote"),
         ),
     ] = None,
     depth: Annotated[
@@ -65,7 +65,7 @@ def locate(
         int,
         typer.Option(
             help="With a data set: number of most similar twins to try for each object.",
-            callback=choices.count_of("--tried"),
+            callback=option_values.count_callback("--tried"),
         ),
     ] = 5,
     estimator: Annotated[
@@ -97,7 +97,7 @@ def locate(
     ] = None,
     robot: Annotated[
         str | None,
-        choices.ROBOTS.option(
+        option_values.ROBOTS.option(
             help="Also print the free grasps that this robot reaches; needs --base, implies --grasps."
         ),
     ] = None,
@@ -114,12 +114,12 @@ def locate(
         files = files.with_captured(seen)
     grasps = grasps or robot is not None
     files.check(grasps=grasps, robot=robot)
-    from manitwin.cli.locating import find_twin, find_twin_of_any_size, find_twins, scene_of
+    from manitwin.cli.twin_location import find_twin, find_twin_of_any_size, find_twins, located_scene_or_reason
     from manitwin.config import ServicesConfig
     from manitwin.episodes.located_view import LocatedView
     from manitwin.models.pose_estimators.from_spec import pose_estimator
     from manitwin.robots.grippers.gripper import load_gripper
-    from manitwin.scenes.locate.base_file import read_base
+    from manitwin.scenes.locate.hand_eye_file import read_camera_to_base
     from manitwin.scenes.locate.layout_files import dataset_of_twin, layout_document
     from manitwin.scenes.locate.located_scene import LocatedScene
     from manitwin.scenes.locate.report import location_document, things_document, write_location
@@ -128,7 +128,7 @@ def locate(
     from manitwin.twin.store import RECORD
 
     model = None if estimator is None else pose_estimator(estimator, ServicesConfig())
-    camera_to_base = None if files.base is None else read_base(files.base)
+    camera_to_base = None if files.base is None else read_camera_to_base(files.base)
     one = Twin(source) if (source / RECORD).exists() else None
     dataset = DatasetRoot(source).absolute() if one is None else dataset_of_twin(source)
     if fit_size and (one is None or estimator is not None):
@@ -138,14 +138,16 @@ def locate(
     grippers = [load_gripper(name) for name in gripper or ()]
     view, masks = files.read(seed)
     if one is None:
-        found = find_twins(DatasetRoot(source), view, masks, model, tried=tried, seed=seed, on_twin=_drawn)
+        found = find_twins(
+            DatasetRoot(source), view, masks, model, tried=tried, seed=seed, on_twin=_print_embedded_twin
+        )
     elif fit_size:
         found = find_twin_of_any_size(one, view, masks, seed)
     else:
         found = find_twin(one, view, masks, model, seed)
     things = found.things
     place = LocatedView(view, list(zip(things, found.twins, strict=True)), camera_to_base, robot, seed, grippers)
-    usable = grasps and found.has_own_size
+    usable = grasps and found.has_true_size
     carried = [place.grasps(number) if usable else None for number in range(len(things))]
     rests = [place.placements(number) if usable else () for number in range(len(things))]
     if one is not None:
@@ -154,7 +156,7 @@ def locate(
         document = things_document(str(source), place.things, carried, found.estimator, rests)
     layout, written = None, None
     if out is not None and any(thing.location.poses for thing in things):
-        scene = scene_of(place, found, dataset, of_cloud=cloud is not None)
+        scene = located_scene_or_reason(place, found, dataset, of_cloud=cloud is not None)
         layout = layout_document(scene)
         if isinstance(scene, LocatedScene) and dataset is not None:
             written = scene, dataset
@@ -164,13 +166,15 @@ def locate(
     if json_:
         print_document(document)
     else:
-        _print_things(things, [document] if one is not None else document["things"], one is None, grasps, usable)
+        _print_located_objects(
+            things, [document] if one is not None else document["things"], one is None, grasps, usable
+        )
         print_layout(layout, out)
     raise typer.Exit(0 if any(thing.location.status != "none" for thing in things) else 3)
 
 
-def _print_things(
-    things: Sequence[Thing], told: Sequence[dict[str, Any]], of_many: bool, grasps: bool, usable: bool
+def _print_located_objects(
+    things: Sequence[ViewedObject], told: Sequence[dict[str, Any]], of_many: bool, grasps: bool, usable: bool
 ) -> None:
     """Say what was found of each thing; ``usable``: grasps and placements were asked for, and hold at the size that it has."""
     for thing, said in zip(things, told, strict=True):
@@ -180,5 +184,5 @@ def _print_things(
         print_frames(said["functional"], said["placements"] if usable else None)
 
 
-def _drawn(twin_id: str) -> None:
+def _print_embedded_twin(twin_id: str) -> None:
     error_console.print(f"{twin_id}: rendered and embedded; the result is cached", markup=False)

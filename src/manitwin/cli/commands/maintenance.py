@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices, options
-from manitwin.cli.console import err_console, note_old_layout, out_console, print_error
+from manitwin.cli import option_values, options
+from manitwin.cli.console import err_console, out_console, print_error, print_layout_notice
 
 _AGAIN = "rerun the build command with its inputs: it finds the finished twins, and builds the rest"
 
@@ -71,9 +71,9 @@ def check(
 
 def _is_ledger(path: Path, root: DatasetRoot, dry_run: bool) -> bool:
     """Tell whether a data set has a ledger that can be read; a damaged one is put aside. Raises UsageError without twins."""
+    from manitwin.engine.ledger.integrity import LedgerDamaged, move_damaged_ledger
     from manitwin.engine.ledger.lock import hold_lock
     from manitwin.engine.ledger.reading import read_ledger
-    from manitwin.engine.ledger.soundness import LedgerDamaged, put_aside
 
     if not os.path.lexists(path) and root.has_twins:
         out_console.print(f"{path}: no ledger; {_AGAIN}")
@@ -88,21 +88,21 @@ def _is_ledger(path: Path, root: DatasetRoot, dry_run: bool) -> bool:
             err_console.print(f"{cause}; without --dry-run it is moved aside; then {_AGAIN}")
             return False
         with hold_lock(path):
-            out_console.print(f"{cause}: moved aside as {put_aside(path).name}; {_AGAIN}")
+            out_console.print(f"{cause}: moved aside as {move_damaged_ledger(path).name}; {_AGAIN}")
         return False
 
 
 def _check_folders(root: DatasetRoot, dry_run: bool, digests: bool) -> None:
     """Check the twins of a data set without a ledger, or of the old layout, and its index where it has one."""
-    from manitwin.dataset.check import damaged_twins, index_damage, indexed_again
+    from manitwin.dataset.check import damaged_twins, index_damage, rebuild_index
 
-    note_old_layout(root)
+    print_layout_notice(root)
     damaged = list(damaged_twins(root, digests=digests))
     index = index_damage(root)
     for line in (*damaged, *([index] if index and (dry_run or damaged) else [])):
         err_console.print(line)
     if index and not dry_run and not damaged:
-        indexed_again(root)
+        rebuild_index(root)
         out_console.print(f"{index}: repaired")
     verdict = f"{len(damaged)} are damaged" if damaged else "all their files are there"
     out_console.print(f"{len(list(root.twin_ids()))} twins: {verdict}")
@@ -111,7 +111,7 @@ def _check_folders(root: DatasetRoot, dry_run: bool, digests: bool) -> None:
 
 def retry(
     dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
-    state: Annotated[str, choices.ENDED_STATES.option(help="State of the items: failed or rejected.")] = "failed",
+    state: Annotated[str, option_values.ENDED_STATES.option(help="State of the items: failed or rejected.")] = "failed",
     stage: Annotated[str | None, typer.Option(help="Retry only items that ended in this stage.")] = None,
     reason: Annotated[str | None, typer.Option(help="Retry only items that ended for this reason.")] = None,
 ) -> None:
@@ -119,7 +119,7 @@ def retry(
     from manitwin.engine.ledger.ledger import Ledger
     from manitwin.engine.ledger.location import local_ledger
     from manitwin.engine.ledger.reading import read_ledger
-    from manitwin.errors import UsageError, choose_from
+    from manitwin.errors import UsageError, unknown_name_message
     from manitwin.twin.dataset_root import DatasetRoot
 
     root = DatasetRoot(dataset)
@@ -127,7 +127,7 @@ def retry(
     with read_ledger(path) as reader:
         stages = [row[0] for row in reader.execute("SELECT DISTINCT stage FROM stages")]
         if stage is not None and stage not in stages:
-            raise UsageError(choose_from("stage", stage, stages))
+            raise UsageError(unknown_name_message("stage", stage, stages))
         rows = reader.execute(
             "SELECT i.number, i.twin_id FROM items i WHERE i.state = ?1 AND (?2 IS NULL OR i.reason = ?2) AND (?3 IS NULL"
             " OR EXISTS (SELECT 1 FROM stages s WHERE s.number = i.number AND s.stage = ?3 AND s.state = ?1))",
@@ -147,7 +147,7 @@ def retry(
 def index(
     dataset: Annotated[
         str,
-        options.existing("A data set: a folder or URL.", "DATASET", "the folder or URL of a data set"),
+        options.existing_path_argument("A data set: a folder or URL.", "DATASET", "the folder or URL of a data set"),
     ],
     jobs: options.Jobs = None,
 ) -> None:
@@ -157,7 +157,7 @@ def index(
     from manitwin.api import write_index
     from manitwin.twin.dataset_root import DatasetRoot
 
-    note_old_layout(DatasetRoot(dataset))
+    print_layout_notice(DatasetRoot(dataset))
     columns = (TextColumn("reading"), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=err_console, transient=True) as progress:
         task = progress.add_task("reading", total=None)

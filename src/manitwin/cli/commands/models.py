@@ -8,14 +8,16 @@ from typing import Annotated
 
 import typer
 
-from manitwin.cli import choices
+from manitwin.cli import option_values
 from manitwin.cli.console import out_console
 
 
 def models(
-    action: Annotated[str, choices.MODEL_ACTIONS.argument(help="What to do: list or add.", metavar="ACTION")] = "list",
+    action: Annotated[
+        str, option_values.MODEL_ACTIONS.argument(help="What to do: list or add.", metavar="ACTION")
+    ] = "list",
     name: Annotated[
-        str | None, choices.WEIGHTS.argument(help="Weights to add: isnet or u2net.", metavar="NAME")
+        str | None, option_values.WEIGHTS.argument(help="Weights to add: isnet or u2net.", metavar="NAME")
     ] = None,
     source: Annotated[
         Path | None,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import out_console
 from manitwin.cli.documents import Json, print_document
 
@@ -22,17 +22,20 @@ _BYTES: tuple[_Unit, ...] = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
 
 def plan(
     dataset: Annotated[
-        str, options.existing("A data set with an index.", "DATASET", "the folder or URL of a data set")
+        str, options.existing_path_argument("A data set with an index.", "DATASET", "the folder or URL of a data set")
     ],
     items: Annotated[
-        int, typer.Option(help="Number of inputs to build.", callback=choices.count_of("items"))
+        int, typer.Option(help="Number of inputs to build.", callback=option_values.count_callback("items"))
     ] = 100_000,
     cores: Annotated[
-        int, typer.Option(help="Number of CPU cores to build on.", callback=choices.count_of("cores", 10**6))
+        int,
+        typer.Option(help="Number of CPU cores to build on.", callback=option_values.count_callback("cores", 10**6)),
     ] = 64,
     core_hour_usd: Annotated[
         float | None,
-        typer.Option(help="Price of one core-hour, in USD.", callback=choices.amount_of("--core-hour-usd", 1e4)),
+        typer.Option(
+            help="Price of one core-hour, in USD.", callback=option_values.amount_callback("--core-hour-usd", 1e4)
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Random seed.", min=0, max=options.LARGEST_SEED)] = 0,
     json_: Json = False,
@@ -55,8 +58,8 @@ def _lines(told: Forecast) -> list[str]:
     lines = [
         f"{told.items:,} inputs on {told.cores:,} cores, estimated from {told.measured:,} measured inputs (intervals: 95 %)",
         f"accepted twins: {_range(told.accepted, 1, '')}",
-        f"CPU time: {_measured(told.cpu_hours, _CORE_HOURS)}; of it {shares}",
-        f"time: {_measured(told.hours, _HOURS)} with all cores always busy; the slowest input took"
+        f"CPU time: {_format_in_unit(told.cpu_hours, _CORE_HOURS)}; of it {shares}",
+        f"time: {_format_in_unit(told.hours, _HOURS)} with all cores always busy; the slowest input took"
         f" {told.slowest_cpu_s:,.0f} CPU s",
         f"services: {_range(told.services_usd, 1, ' dollars')}, as recorded",
     ]
@@ -64,9 +67,9 @@ def _lines(told: Forecast) -> list[str]:
         lines.append("dollars: unknown; give the price of a core-hour with --core-hour-usd")
     else:
         lines.append(f"dollars: {_range(told.usd, 1, '')}, including services")
-    disk = [f"twins {_measured(told.twins_bytes, _BYTES)}"]
+    disk = [f"twins {_format_in_unit(told.twins_bytes, _BYTES)}"]
     if told.work_bytes is not None:
-        disk.append(f"results of stages {_measured(told.work_bytes, _BYTES)}, none with run.keep_work = false")
+        disk.append(f"results of stages {_format_in_unit(told.work_bytes, _BYTES)}, none with run.keep_work = false")
     disk.append(f"index {_rounded(told.index_bytes)}, ledger {_rounded(told.ledger_bytes)}")
     lines.append(f"disk: {'; '.join(disk)}")
     if told.memory_bytes is None:
@@ -78,18 +81,18 @@ def _lines(told: Forecast) -> list[str]:
     return lines
 
 
-def _unit_of(value: float, units: tuple[_Unit, ...]) -> _Unit:
+def _choose_unit(value: float, units: tuple[_Unit, ...]) -> _Unit:
     """Return the first of some units, the largest first, of which a value has one or more; else the last."""
     return next((unit for unit in units if value >= unit[0]), units[-1])
 
 
-def _measured(amount: Amount, units: tuple[_Unit, ...]) -> str:
-    size, name = _unit_of(amount.value, units)
+def _format_in_unit(amount: Amount, units: tuple[_Unit, ...]) -> str:
+    size, name = _choose_unit(amount.value, units)
     return _range(amount, size, f" {name}")
 
 
 def _rounded(size_bytes: float) -> str:
-    size, name = _unit_of(size_bytes, _BYTES)
+    size, name = _choose_unit(size_bytes, _BYTES)
     return f"{size_bytes / size:,.3g} {name}"
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manitwin.cli import options
-from manitwin.cli.choices import LARGEST_COUNT
-from manitwin.cli.console import err_console, note_old_layout, out_console
+from manitwin.cli.console import err_console, out_console, print_layout_notice
+from manitwin.cli.option_values import LARGEST_COUNT
 
 if TYPE_CHECKING:
     from manitwin.dataset.publish.publish import Published, ShardDone
@@ -21,7 +21,7 @@ SHARD_SIZE_MB = 1000  # as in publish/publish.py, which is imported when it is n
 def publish(
     dataset: Annotated[
         str,
-        options.existing(
+        options.existing_path_argument(
             "A data set (a folder or a URL), or a folder of episodes.",
             "DATASET|EPISODES",
             "the folder or URL of a data set",
@@ -55,7 +55,7 @@ def publish(
 
     allowed = None if license_allow is None else license_allow.split(",")
     root = DatasetRoot(dataset)
-    note_old_layout(root)
+    print_layout_notice(root)
     if root.local is not None and root.exists(ATTEMPTS):
         if twins_per_shard is not None or shard_size_mb != SHARD_SIZE_MB:
             raise UsageError(
@@ -91,13 +91,13 @@ def _publish_episodes(
     lines = [
         f"{published.episodes:,} episodes of {published.twins:,} twins, {published.frames:,} frames; "
         f"{published.files:,} files, {published.bytes / 1e6:,.1f} MB",
-        *_held_back_lines(published),
+        *_unpublished_lines(published),
     ]
     for line in (*lines, f"in {out}"):
         out_console.print(line)
 
 
-def _held_back_lines(published: Published | PublishedEpisodes) -> list[str]:
+def _unpublished_lines(published: Published | PublishedEpisodes) -> list[str]:
     lines = []
     if published.left_out:
         by_licence = ", ".join(f"{name} {count:,}" for name, count in published.left_out.items())
@@ -118,7 +118,7 @@ def outcome_lines(published: Published) -> list[str]:
     ]
     if published.rejected:
         lines.append(f"{published.rejected:,} rejected twins are not published")
-    return lines + _held_back_lines(published)
+    return lines + _unpublished_lines(published)
 
 
 def _say_shard(done: ShardDone) -> None:

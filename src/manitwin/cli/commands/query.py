@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from manitwin.cli import choices
-from manitwin.cli.console import note_old_layout, out_console, write_json, write_text
+from manitwin.cli import option_values
+from manitwin.cli.console import out_console, print_layout_notice, write_json, write_text
 from manitwin.formats.plurals import counted
 from manitwin.formats.printable import printable_line
 
@@ -43,27 +43,34 @@ def query(
     ] = None,
     table: Annotated[
         str,
-        choices.TABLES.option(help="Table: twins, points, grasps, placements, rejections or stages.", metavar="NAME"),
+        option_values.TABLES.option(
+            help="Table: twins, points, grasps, placements, rejections or stages.", metavar="NAME"
+        ),
     ] = "twins",
     columns: Annotated[str | None, typer.Option(help="Columns to print, separated by commas.", metavar="A,B")] = None,
     limit: Annotated[
-        int | None, typer.Option(help="Maximum number of rows to print.", metavar="N", min=0, max=choices.LARGEST_COUNT)
+        int | None,
+        typer.Option(help="Maximum number of rows to print.", metavar="N", min=0, max=option_values.LARGEST_COUNT),
     ] = None,
     format: Annotated[
         str,
-        choices.QUERY_FORMATS.option(
+        option_values.QUERY_FORMATS.option(
             "--format", "-f", help="Output format: table, csv, json or ids.", metavar="FORMAT"
         ),
     ] = "table",
     timeout: Annotated[
         float,
         typer.Option(
-            help="Time limit of the query, in seconds.", metavar="SECONDS", callback=choices.amount_of("--timeout", 1e6)
+            help="Time limit of the query, in seconds.",
+            metavar="SECONDS",
+            callback=option_values.amount_callback("--timeout", 1e6),
         ),
     ] = 60.0,
     memory_gb: Annotated[
         float,
-        typer.Option(help="Memory limit of the query.", metavar="GB", callback=choices.amount_of("--memory-gb", 1e5)),
+        typer.Option(
+            help="Memory limit of the query.", metavar="GB", callback=option_values.amount_callback("--memory-gb", 1e5)
+        ),
     ] = 4.0,
 ) -> None:
     """Print the rows of a data set's index that satisfy a condition, sorted by twin."""
@@ -79,7 +86,7 @@ def query(
     if format == "ids":
         names = ["twin_id"]
     answers = Index(dataset, timeout_s=timeout, memory_gb=memory_gb)
-    note_old_layout(answers.root)
+    print_layout_notice(answers.root)
     rows = answers.select(table, where or (), columns=names, limit=limit)
     try:
         WRITERS[format](rows, write_json if format == "json" else write_text)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.causes import print_causes
 from manitwin.cli.console import err_console, out_console, print_error
 
@@ -20,27 +20,29 @@ if TYPE_CHECKING:
 def render(
     episodes: Annotated[
         Path,
-        options.existing(
+        options.existing_path_argument(
             "A folder that `manitwin trajectories` wrote, or a twin.",
             "EPISODES|TWIN",
             "the folder that manitwin trajectories wrote, or a twin's",
         ),
     ],
     cameras: Annotated[
-        str | None, choices.CAMERAS.option(help="Cameras, separated by commas: front, side, top, wrist.")
+        str | None, option_values.CAMERAS.option(help="Cameras, separated by commas: front, side, top, wrist.")
     ] = None,
     size: Annotated[
         int | None, typer.Option(help="Width and height of a picture, in pixels.", min=64, max=2048)
     ] = None,
     codec: Annotated[
         str | None,
-        choices.CODECS.option(
+        option_values.CODECS.option(
             help="Video codec: av1 (plays in browsers), vp9 (also in older ones; slow to write) or mpeg4 (in none)."
         ),
     ] = None,
     rate_hz: Annotated[
         str | None,
-        choices.RATES_HZ.option(help="Frame rate of the LeRobot data set in Hz: 20, 10 or 5; lower rates cost less."),
+        option_values.RATES_HZ.option(
+            help="Frame rate of the LeRobot data set in Hz: 20, 10 or 5; lower rates cost less."
+        ),
     ] = None,
     twins: options.Twins = None,
     joint: Annotated[
@@ -72,14 +74,14 @@ def render(
         PicturesConfig, run, {"cameras": names, "size_px": size, "codec": codec, "rate_hz": rate}
     )
     from manitwin.api import render_episodes
-    from manitwin.cli.progress import WatchedRun
+    from manitwin.cli.progress import RunDisplay
     from manitwin.episodes.episode_pictures import PICTURES
 
     written: list[LeRobotSummary] = []
-    with WatchedRun("batches", episodes / PICTURES) as watched:
+    with RunDisplay("batches", episodes / PICTURES) as watched:
         report = render_episodes(
             episodes, config=settings, twins=twins, on_written=written.append,
-            **options.placed(run), **watched.callbacks,
+            **options.executor_settings(run), **watched.callbacks,
         )  # fmt: skip
     for remark in report.remarks:
         err_console.print(remark)
@@ -104,7 +106,7 @@ def _draw_twin(folder: Path, said: list[str] | None, out: Path | None, size: int
         raise UsageError(f"{folder}: is a twin; give a file for its picture with --out FILE.png")
     positions = dict(_position(each) for each in said or ())
     from manitwin.render.device import require_renderer
-    from manitwin.render.joint_states import PANEL_PX, draw_joint_states, telling_states
+    from manitwin.render.joint_states import PANEL_PX, draw_joint_states, representative_states
     from manitwin.twin.loaded_twin import Twin
     from manitwin.twin.store import write_bytes_atomically
 
@@ -112,7 +114,7 @@ def _draw_twin(folder: Path, said: list[str] | None, out: Path | None, size: int
     if not twin.record.joints:
         raise UsageError(f"{folder}: has no joints: it is one rigid body; its pictures are in {folder}/views")
     require_renderer()
-    states = [positions] if positions else telling_states(twin)
+    states = [positions] if positions else representative_states(twin)
     write_bytes_atomically(out, draw_joint_states(twin, states, size or PANEL_PX))
     out_console.print(f"{out}: {len(states)} states of {len(twin.record.joints)} joints")
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import error_console, out_console, print_error
 from manitwin.cli.documents import Json, print_document
 
@@ -20,10 +20,16 @@ SAMPLED = 500
 """As many as the paper's annotators judged."""
 
 Dataset = Annotated[
-    str, options.existing("A data set: a folder with an index.", "DATASET", "a data set that manitwin build made")
+    str,
+    options.existing_path_argument(
+        "A data set: a folder with an index.", "DATASET", "a data set that manitwin build made"
+    ),
 ]
 Sample = Annotated[
-    int, typer.Option("--sample", help="Number of twins to review.", callback=choices.count_of("--sample", 1_000_000))
+    int,
+    typer.Option(
+        "--sample", help="Number of twins to review.", callback=option_values.count_callback("--sample", 1_000_000)
+    ),
 ]
 Overlap = Annotated[
     float,
@@ -40,7 +46,9 @@ Annotators = Annotated[
 ]
 Given = Annotated[
     int | None,
-    typer.Option("--sample", help="Number of twins to review.", callback=choices.count_of("--sample", 1_000_000)),
+    typer.Option(
+        "--sample", help="Number of twins to review.", callback=option_values.count_callback("--sample", 1_000_000)
+    ),
 ]
 
 
@@ -65,7 +73,7 @@ def review(
     """Review a sample of twins in the browser by keyboard, until interrupted; without --sample, the last sample drawn."""
     import webbrowser
 
-    from manitwin.cli.commands.view import has_screen, interruptible, tell_link, warn_if_open
+    from manitwin.cli.commands.view import has_screen, print_unlogged_link, stop_server_on_interrupt, warn_if_open
     from manitwin.dataset.index.query import Index
     from manitwin.dataset.review.plan import draw_plan, require_annotator
     from manitwin.dataset.review.session import ReviewSession
@@ -81,8 +89,8 @@ def review(
         draw_plan(dataset, sample, seed, overlap)
     tokens = Tokens(AccessFile(reviews_path(root).with_name(ACCESS)))
     if revoke:
-        tokens.forget()
-    with ReviewStore(reviews_path(root)) as store, interruptible() as ends_with:
+        tokens.revoke_all()
+    with ReviewStore(reviews_path(root)) as store, stop_server_on_interrupt() as ends_with:
         kept = store.plan()
         plan = kept if kept is not None else draw_plan(dataset, SAMPLED, seed, overlap)[0]
         session = ReviewSession(store, Index(root), plan, names, blind=blind)
@@ -97,7 +105,9 @@ def review(
         def tell(server: PageServer) -> None:
             for name in names:
                 left = session.progress(name).left
-                tell_link(server.link(PATH, name), f"for {name} alone, {left} twins; until interrupted (Ctrl-C)")
+                print_unlogged_link(
+                    server.link(PATH, name), f"for {name} alone, {left} twins; until interrupted (Ctrl-C)"
+                )
 
         serve_review(dataset, session, host, port, ready, tell, tokens)
         out_console.print(f"`manitwin review report {dataset}` summarises the verdicts")
@@ -137,14 +147,14 @@ def review_import(
     dataset: Dataset,
     verdicts: Annotated[
         Path,
-        options.existing(
+        options.existing_path_argument(
             "Verdicts, one row per answer (docs/review.md).", "FILE.csv|FILE.jsonl", "a CSV or JSONL file of verdicts"
         ),
     ],
 ) -> None:
     """Import verdicts made elsewhere: a whole file or nothing; verdicts that are there already are skipped."""
+    from manitwin.dataset.review.review_subjects import read_twin
     from manitwin.dataset.review.store import ReviewStore, reviews_path
-    from manitwin.dataset.review.twins_seen import read_twin
     from manitwin.dataset.review.verdict_files import read_verdicts
     from manitwin.twin.dataset_root import DatasetRoot
 
@@ -152,7 +162,7 @@ def review_import(
     path, read = reviews_path(root), read_verdicts(verdicts, root)
     with ReviewStore(path) as store:
         added = store.add((review for review, _ in read), (request for _, request in read))
-        followed = store.followed()
+        followed = store.successor_function()
     there = f", {len(read) - added} were already there" if added < len(read) else ""
     out_console.print(f"{added} reviews imported{there}; `manitwin review report {dataset}` summarises them")
     now = {twin_id: read_twin(root, twin_id).revision for twin_id in {review.twin_id for review, _ in read}}
@@ -170,20 +180,20 @@ def review_apply(
     jobs: options.Jobs = None,
 ) -> None:
     """Write uncontradicted corrections into the twins, and rebuild what depends on them."""
-    from manitwin.cli.progress import WatchedRun
+    from manitwin.cli.progress import RunDisplay
     from manitwin.dataset.review.apply import apply_reviews
-    from manitwin.dataset.review.report import shown_correction
+    from manitwin.dataset.review.report import correction_text
     from manitwin.engine.amendments import amendments_name
 
     if dry_run:
         done = apply_reviews(dataset, dry_run=True)
     else:
-        with WatchedRun("twins", dataset) as watched:
+        with RunDisplay("twins", dataset) as watched:
             done = apply_reviews(dataset, jobs=jobs, **watched.callbacks)
     for each in done.corrections:
-        out_console.print(f"{each.twin_id} {each.name}: {shown_correction(each.value)} ({each.source})")
+        out_console.print(f"{each.twin_id} {each.name}: {correction_text(each.value)} ({each.source})")
     for conflict in done.conflicts:
-        said = ", ".join(f"{name} says {shown_correction(value)}" for name, value in conflict.said.items())
+        said = ", ".join(f"{name} says {correction_text(value)}" for name, value in conflict.said.items())
         out_console.print(f"not applied: {conflict.twin_id} {conflict.name}: {said}")
     for twin_id, reason in done.left.items():
         out_console.print(f"not applied: {twin_id}: {reason}")
@@ -236,13 +246,13 @@ def review_tune(
     ] = None,
 ) -> None:
     """Propose thresholds that agree better with the verdicts, if they also do so on held-out twins."""
-    from manitwin.dataset.review.tuning import toml_of, tune_dataset
+    from manitwin.dataset.review.tuning import proposals_toml, tune_dataset
     from manitwin.twin.store import write_bytes_atomically
 
     tuned = tune_dataset(dataset)
     for each in tuned:
         out_console.print(each.line())
-    proposed = toml_of(tuned)
+    proposed = proposals_toml(tuned)
     if not proposed:
         out_console.print("no threshold is proposed")
     elif out is not None:

@@ -70,7 +70,7 @@ def review_cutouts(
     if draw and (accept or sheet is not None):
         raise UsageError("--draw cannot be combined with --accept or --sheet; run them as separate commands")
 
-    from manitwin.cli.progress import WatchedRun
+    from manitwin.cli.progress import RunDisplay
     from manitwin.dataset.review.cutouts import confirm, doubted_photos, write_sheets
     from manitwin.dataset.review.plan import require_annotator
     from manitwin.formats.printable import printable_line
@@ -80,7 +80,7 @@ def review_cutouts(
     if draw:
         from manitwin.dataset.review.outlines import OutlineSession
 
-        raise typer.Exit(_draw(dataset, OutlineSession(root, name, redraw or ()), host, port, browser, jobs))
+        raise typer.Exit(_serve_and_build(dataset, OutlineSession(root, name, redraw or ()), host, port, browser, jobs))
     photos = doubted_photos(root)
     if sheet is not None:
         for written in write_sheets(root, photos, sheet):
@@ -90,44 +90,46 @@ def review_cutouts(
             out_console.print(f"{each.twin_id}  {printable_line(each.detail, max_characters=400)}")
         out_console.print(f"{len(photos)} cut-outs are doubted")
         raise typer.Exit(0)
-    with WatchedRun("photos", dataset) as watched:
+    with RunDisplay("photos", dataset) as watched:
         confirmed, run = confirm(root, accept, name, jobs=jobs, **watched.callbacks)
-    raise typer.Exit(_told(dataset, run, f"{len(confirmed)} cut-outs are confirmed by {name}"))
+    raise typer.Exit(_print_run_outcome(dataset, run, f"{len(confirmed)} cut-outs are confirmed by {name}"))
 
 
-def _draw(dataset: str, session: OutlineSession, host: str, port: int, browser: bool, jobs: int | None) -> int:
+def _serve_and_build(
+    dataset: str, session: OutlineSession, host: str, port: int, browser: bool, jobs: int | None
+) -> int:
     """Serve the pages until interrupted, then build what was drawn; returns the exit status."""
     import webbrowser
 
-    from manitwin.cli.commands.view import has_screen, interruptible, tell_link, warn_if_open
-    from manitwin.cli.progress import WatchedRun
+    from manitwin.cli.commands.view import has_screen, print_unlogged_link, stop_server_on_interrupt, warn_if_open
+    from manitwin.cli.progress import RunDisplay
     from manitwin.errors import UsageError
     from manitwin.web.serve import draw_outlines
 
     if not session.photos:
         raise UsageError(f"{dataset}: no photo was rejected for its cut-out; --redraw ID shows another photo")
     remark = f"{len(session.photos)} photos; stop with Ctrl-C to build what was drawn"
-    with interruptible() as ends_with:
+    with stop_server_on_interrupt() as ends_with:
 
         def ready(server: PageServer) -> None:
             ends_with(server)
             warn_if_open(server)
-            tell_link(server.link(), remark)
+            print_unlogged_link(server.link(), remark)
             if browser and has_screen():
                 webbrowser.open(server.link())
 
-        draw_outlines(session, host, port, ready, lambda link: tell_link(link, remark))
-    if not session.kept and not session.said:
+        draw_outlines(session, host, port, ready, lambda link: print_unlogged_link(link, remark))
+    if not session.outlined_keys and not session.restated_twins:
         out_console.print("stopped; nothing was drawn")
         return 0
-    with WatchedRun("photos", dataset) as watched:
+    with RunDisplay("photos", dataset) as watched:
         run = session.build(jobs=jobs, **watched.callbacks)
-    said = f", {len(session.said)} things are named or measured," if session.said else ""
-    begun = f"{len(session.kept)} outlines are drawn{said} by {session.annotator}"
-    return _told(dataset, run, begun, "; `--draw --redraw ID` shows one of them again")
+    said = f", {len(session.restated_twins)} things are named or measured," if session.restated_twins else ""
+    begun = f"{len(session.outlined_keys)} outlines are drawn{said} by {session.annotator}"
+    return _print_run_outcome(dataset, run, begun, "; `--draw --redraw ID` shows one of them again")
 
 
-def _told(dataset: str, run: RunReport, begun: str, remedy: str = "") -> int:
+def _print_run_outcome(dataset: str, run: RunReport, begun: str, remedy: str = "") -> int:
     """Print what became of the photos, and the ``remedy`` where some are not accepted; returns the exit status."""
     counts = run.counts_of_given
     told = ", ".join(f"{counts[state]} {state}" for state in ("accepted", "rejected", "failed") if counts.get(state))

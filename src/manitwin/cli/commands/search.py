@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from manitwin.cli import choices, options
-from manitwin.cli.console import error_console, note_old_layout, out_console
+from manitwin.cli import option_values, options
+from manitwin.cli.console import error_console, out_console, print_layout_notice
 from manitwin.cli.documents import Json, print_document
 
 CAPTION_CHARACTERS = 60
@@ -18,7 +18,9 @@ CAPTION_CHARACTERS = 60
 def search(
     dataset: Annotated[
         str,
-        options.existing("A data set: a folder, or, for words, a URL.", "DATASET", "the folder or URL of a data set"),
+        options.existing_path_argument(
+            "A data set: a folder, or, for words, a URL.", "DATASET", "the folder or URL of a data set"
+        ),
     ],
     words: Annotated[str | None, typer.Argument(help='What to look for: "a blue mug".', metavar="[WORDS]")] = None,
     image: Annotated[
@@ -26,7 +28,7 @@ def search(
         typer.Option(
             help="Photo or crop of one object to search for instead; transparent pixels are background.",
             metavar="FILE",
-            callback=choices.must_exist("a picture of one object"),
+            callback=option_values.existing_path_callback("a picture of one object"),
         ),
     ] = None,
     embedder: Annotated[
@@ -37,7 +39,7 @@ def search(
         ),
     ] = None,
     limit: Annotated[
-        int, typer.Option(help="Maximum number of twins to print.", callback=choices.count_of("--limit"))
+        int, typer.Option(help="Maximum number of twins to print.", callback=option_values.count_callback("--limit"))
     ] = 10,
     json_: Json = False,
 ) -> None:
@@ -50,22 +52,22 @@ def search(
     if image is not None and embedder is not None:
         raise UsageError("--embedder applies to words only; leave it out with --image")
     root = DatasetRoot(dataset)
-    note_old_layout(root)
+    print_layout_notice(root)
     background: str | None = None
     if image is not None:
         from manitwin.dataset.search.search import search_picture
         from manitwin.formats.image_file import read_image
 
-        hits, background = search_picture(root, read_image(image).pixels, limit=limit, on_twin=_drawn)
+        hits, background = search_picture(root, read_image(image).pixels, limit=limit, on_twin=_print_embedded_twin)
     else:
         from manitwin.config import ServicesConfig
-        from manitwin.dataset.search.search import search_words, words_of_no_twin
+        from manitwin.dataset.search.search import find_unknown_words, search_words
         from manitwin.models.embedders.texts import text_embedder
 
         model = None if embedder is None else text_embedder(embedder, ServicesConfig())
         hits = search_words(root, words or "", limit=limit, embedder=model)
         if embedder is None:
-            for word, near in words_of_no_twin(root, words or "").items():
+            for word, near in find_unknown_words(root, words or "").items():
                 spelt = f"; spelt nearly so: {', '.join(near)}" if near else ""
                 error_console.print(f"no twin has the word {word!r}{spelt}", markup=False)
     if json_:
@@ -82,7 +84,7 @@ def search(
         out_console.print("no twin matches these words")
 
 
-def _drawn(twin_id: str) -> None:
+def _print_embedded_twin(twin_id: str) -> None:
     error_console.print(f"{twin_id}: rendered and embedded; the result is cached", markup=False)
 
 

@@ -7,21 +7,21 @@ from typing import Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import out_console
 
 
 def segmentation(
     scenes: Annotated[
         Path,
-        options.existing(
+        options.existing_path_argument(
             "Scenes that `manitwin layout --pictures` drew, or one of them.", "SCENES", "a folder of drawn scenes"
         ),
     ],
     out: Annotated[Path, options.output_folder("The folder to write; it must be new or empty.")],
     form: Annotated[
         str,
-        choices.SEGMENTATION_FORMATS.option(
+        option_values.SEGMENTATION_FORMATS.option(
             "--format", help="Format: coco, coco-panoptic, cityscapes, bop or pointcloud."
         ),
     ],
@@ -31,7 +31,7 @@ def segmentation(
             "--twins",
             help="Data set of the twins; default: the one recorded in the scenes.",
             metavar="DATASET",
-            callback=choices.must_exist("the data set that the scenes were sampled from"),
+            callback=option_values.existing_path_callback("the data set that the scenes were sampled from"),
         ),
     ] = None,
     validation_share: Annotated[
@@ -39,7 +39,9 @@ def segmentation(
     ] = 0.1,
     points: Annotated[
         int,
-        typer.Option(help="Maximum number of points in the cloud of a scene.", callback=choices.count_of("--points")),
+        typer.Option(
+            help="Maximum number of points in the cloud of a scene.", callback=option_values.count_callback("--points")
+        ),
     ] = 100_000,
 ) -> None:
     """Write instance, class and part segmentation of drawn scenes: masks, panoptic pictures, poses, point clouds."""

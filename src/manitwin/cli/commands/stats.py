@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated
 
 from manitwin.cli import options
-from manitwin.cli.console import note_old_layout, out_console
+from manitwin.cli.console import out_console, print_layout_notice
 
 
 def stats(
     dataset: Annotated[
         str,
-        options.existing(
+        options.existing_path_argument(
             "A data set (a folder or URL), or a folder of episodes.",
             "DATASET|EPISODES",
             "the folder or URL of a data set",
@@ -24,7 +24,7 @@ def stats(
     from manitwin.api import write_statistics
     from manitwin.twin.dataset_root import DatasetRoot
 
-    note_old_layout(DatasetRoot(dataset))
+    print_layout_notice(DatasetRoot(dataset))
     written = write_statistics(dataset, out)
     if written.text:
         out_console.print(written.text, paragraph=True)

@@ -140,10 +140,10 @@ def _view(progress: Progress) -> RenderableType:
 
 
 def _print_story(story: ItemStory) -> None:
-    from manitwin.engine.ledger.progress import told
+    from manitwin.engine.ledger.progress import describe_payload
 
     lines = [
-        f"item {story.number}: {told(story.item)}",
+        f"item {story.number}: {describe_payload(story.item)}",
         f"twin {story.twin_id or 'unknown yet'}, {story.state}"
         + (f" ({story.reason})" if story.reason else "")
         + (f": {story.detail}" if story.detail else ""),

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from manitwin.cli import choices, options
-from manitwin.cli.causes import causes_of, print_causes
+from manitwin.cli import option_values, options
+from manitwin.cli.causes import print_causes, read_causes
 from manitwin.cli.console import err_console, out_console, print_error
 from manitwin.cli.documents import Json, print_document
 
@@ -21,16 +21,17 @@ SHOWN_REASONS = 6
 @options.with_options(options.RUN, before="json")
 def tasks(
     scenes: Annotated[
-        str, options.existing("Scenes of `manitwin layout`.", "SCENES", "a folder that manitwin layout wrote")
+        str,
+        options.existing_path_argument("Scenes of `manitwin layout`.", "SCENES", "a folder that manitwin layout wrote"),
     ],
     out: Annotated[Path, options.output_folder("The folder to write tasks into.")],
     per_scene: Annotated[int | None, typer.Option(help="Maximum number of tasks per scene.", min=1, max=1000)] = None,
     robot: Annotated[
-        str | None, choices.ROBOTS.option(help="Robot that executes the tasks: a name, or a TOML file.")
+        str | None, option_values.ROBOTS.option(help="Robot that executes the tasks: a name, or a TOML file.")
     ] = None,
     vlm: Annotated[
         str | None,
-        choices.PROPOSERS.option(
+        option_values.PROPOSERS.option(
             help="Model that proposes further tasks: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or none.",
             metavar="SPEC",
         ),
@@ -48,11 +49,11 @@ def tasks(
     settings = options.read_settings(TasksConfig, run, {"robot": robot, "per_scene": per_scene, "vlm": vlm})
     from manitwin.api import make_tasks
     from manitwin.cli.documents import tasks_document
-    from manitwin.cli.progress import WatchedRun
+    from manitwin.cli.progress import RunDisplay
 
-    with WatchedRun("scenes", out) as watched:
+    with RunDisplay("scenes", out) as watched:
         report = make_tasks(
-            scenes, out, config=settings, twins=twins, bddl=bddl, **options.placed(run), **watched.callbacks
+            scenes, out, config=settings, twins=twins, bddl=bddl, **options.executor_settings(run), **watched.callbacks
         )
     for remark in report.run.remarks:
         err_console.print(remark)
@@ -65,7 +66,7 @@ def tasks(
             written, left_out = report.bddl
             out_console.print(f"{written} tasks in {out}/bddl; BDDL cannot say {left_out} others (left_out.json)")
     if json:
-        print_document(tasks_document(report, str(out), causes_of(str(out))))
+        print_document(tasks_document(report, str(out), read_causes(str(out))))
     if report.totals is None:
         raise typer.Exit(4)
 

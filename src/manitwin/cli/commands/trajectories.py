@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from manitwin.cli import choices, options
-from manitwin.cli.causes import causes_of, print_causes
+from manitwin.cli import option_values, options
+from manitwin.cli.causes import print_causes, read_causes
 from manitwin.cli.console import err_console, out_console, print_error
 from manitwin.cli.documents import Json, print_document
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def trajectories(
     source: Annotated[
         str,
-        options.existing(
+        options.existing_path_argument(
             "A data set, a folder of twins, scenes of `manitwin layout`, or tasks of `manitwin tasks`.",
             "DATASET|SCENES|TASKS",
             "a data set, a folder of twins, or what manitwin layout or manitwin tasks wrote",
@@ -29,13 +29,14 @@ def trajectories(
     ],
     out: Annotated[Path, options.output_folder("The folder to write episodes into.")],
     count: Annotated[
-        int, typer.Option("-n", help="Number of episodes to attempt.", callback=choices.count_of("-n"))
+        int, typer.Option("-n", help="Number of episodes to attempt.", callback=option_values.count_callback("-n"))
     ] = 100,
     robot: Annotated[
-        str | None, choices.ROBOTS.option(help="Robot: a name, or a TOML file that describes one.")
+        str | None, option_values.ROBOTS.option(help="Robot: a name, or a TOML file that describes one.")
     ] = None,
     skill: Annotated[
-        str | None, choices.SKILLS.option(help="Skill: pick_place, place_in, stack, left_of ... (docs/skills.md).")
+        str | None,
+        option_values.SKILLS.option(help="Skill: pick_place, place_in, stack, left_of ... (docs/skills.md)."),
     ] = None,
     twins: options.Twins = None,
     others: Annotated[
@@ -47,7 +48,7 @@ def trajectories(
     ] = True,
     formats: Annotated[
         str,
-        choices.EPISODE_FORMATS.option(
+        option_values.EPISODE_FORMATS.option(
             "--format", help="Formats to write beside the batches: lerobot, maniskill, or both separated by a comma."
         ),
     ] = "lerobot,maniskill",
@@ -60,12 +61,12 @@ def trajectories(
     settings = options.read_settings(TrajectoriesConfig, run, {"robot": robot, "skill": skill, "others": others})
     from manitwin.api import make_episodes
     from manitwin.cli.documents import trajectories_document
-    from manitwin.cli.progress import WatchedRun
+    from manitwin.cli.progress import RunDisplay
 
-    with WatchedRun("batches", out) as watched:
+    with RunDisplay("batches", out) as watched:
         report = make_episodes(
             source, out, count, config=settings, twins=twins, formats=formats.split(","), retire=retire,
-            **options.placed(run), **watched.callbacks,
+            **options.executor_settings(run), **watched.callbacks,
         )  # fmt: skip
     for remark in report.run.remarks:
         err_console.print(remark)
@@ -78,7 +79,7 @@ def trajectories(
             _print_retired(report.retired, report.newly_retired)
         out_console.print(f"manitwin stats {out} shows details")
     if json:
-        print_document(trajectories_document(report, str(out), causes_of(str(out))))
+        print_document(trajectories_document(report, str(out), read_causes(str(out))))
     if report.totals is None:
         raise typer.Exit(4)
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import err_console, error_console, out_console
-from manitwin.cli.interrupt import first_interrupt_calls
+from manitwin.cli.interrupt import call_on_first_interrupt
 
 if TYPE_CHECKING:
     from manitwin.web.serve import PageServer
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def view(
     source: Annotated[
         str,
-        options.existing(
+        options.existing_path_argument(
             "A data set with an index, one twin, scenes, or recorded episodes.",
             "DATASET|TWIN|SCENES|EPISODES",
             "a data set's, a twin's, scenes' or episodes' folder, or an HDF5 file of episodes",
@@ -40,14 +40,14 @@ def view(
         typer.Option(
             help="Write the pages as static files into this new folder, and start no server.",
             metavar="OUT",
-            callback=choices.folder_to_write,
+            callback=option_values.check_output_folder,
         ),
     ] = None,
     sample: Annotated[
         int | None,
         typer.Option(
             help="With --static: number of twins, scenes or episodes to draw at random.",
-            callback=choices.count_of("sample"),
+            callback=option_values.count_callback("sample"),
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="With --sample: random seed.", min=0, max=options.LARGEST_SEED)] = 0,
@@ -76,37 +76,37 @@ def view(
     def ready(server: PageServer) -> None:
         ends_with(server)
         warn_if_open(server)
-        tell_link(server.link(), "until interrupted (Ctrl-C)")
+        print_unlogged_link(server.link(), "until interrupted (Ctrl-C)")
         if browser and has_screen():
             webbrowser.open(server.link())
 
-    with interruptible() as ends_with:
+    with stop_server_on_interrupt() as ends_with:
         serve(
             source,
             host,
             port,
             ready,
-            lambda link: tell_link(link, "new link, because the old one was used a second time"),
+            lambda link: print_unlogged_link(link, "new link, because the old one was used a second time"),
             twins,
         )
         out_console.print("stopped")
 
 
 @contextmanager
-def interruptible() -> Iterator[Callable[[PageServer], None]]:
+def stop_server_on_interrupt() -> Iterator[Callable[[PageServer], None]]:
     """Give a function that has the first interrupt from then on end a server in order; before, it ends the command."""
     with ExitStack() as ending:
 
         def ends(server: PageServer) -> None:
-            ending.enter_context(first_interrupt_calls(server.stop, (signal.SIGINT, signal.SIGTERM)))
+            ending.enter_context(call_on_first_interrupt(server.stop, (signal.SIGINT, signal.SIGTERM)))
 
         yield ends
 
 
 def _write(source: str, out: Path, sample: int | None, seed: int, where: str, trials: int, twins: str | None) -> None:
-    from manitwin.web.plain_files import write_plain_files
+    from manitwin.web.static_pages import write_static_pages
 
-    done = write_plain_files(source, out, sample=sample, seed=seed, where=where, trials=trials, twins=twins)
+    done = write_static_pages(source, out, sample=sample, seed=seed, where=where, trials=trials, twins=twins)
     for name, reason in done.left_out.items():
         err_console.print(f"{name} is left out: {reason}")
     pages = "".join(
@@ -126,7 +126,7 @@ def warn_if_open(server: PageServer) -> None:
         )
 
 
-def tell_link(link: str, remark: str) -> None:
+def print_unlogged_link(link: str, remark: str) -> None:
     """Print a link, and write it to no log: it opens the pages to whoever has it first."""
     out_console.print(f"{link}  ({remark})", logged=False)
     sys.stdout.flush()

@@ -7,27 +7,31 @@ from typing import Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import option_values, options
 from manitwin.cli.console import out_console
 
 
 def vqa(
     scenes: Annotated[
         Path,
-        options.existing(
+        options.existing_path_argument(
             "Scenes that `manitwin layout --pictures` drew, or one of them.", "SCENES", "a folder of drawn scenes"
         ),
     ],
     out: Annotated[Path, options.output_folder("The folder to write; it must be new or empty.")],
     form: Annotated[
-        str, choices.VQA_FORMATS.option("--format", help="Format: llava (LLaVA and ShareGPT), parquet or webdataset.")
+        str,
+        option_values.VQA_FORMATS.option("--format", help="Format: llava (LLaVA and ShareGPT), parquet or webdataset."),
     ] = "llava",
     per_scene: Annotated[
-        int, typer.Option(help="Maximum number of questions per scene.", callback=choices.count_of("--per-scene"))
+        int,
+        typer.Option(
+            help="Maximum number of questions per scene.", callback=option_values.count_callback("--per-scene")
+        ),
     ] = 80,
     points: Annotated[
         str,
-        choices.POINT_CONVENTIONS.option(
+        option_values.POINT_CONVENTIONS.option(
             "--points", help="Coordinate convention of points: unit, robopoint, roborefer, pixel or thousand."
         ),
     ] = "unit",
@@ -37,7 +41,7 @@ def vqa(
             "--twins",
             help="Data set of the twins; default: the one recorded in the scenes.",
             metavar="DATASET",
-            callback=choices.must_exist("the data set that the scenes were sampled from"),
+            callback=option_values.existing_path_callback("the data set that the scenes were sampled from"),
         ),
     ] = None,
     validation_share: Annotated[
@@ -49,7 +53,7 @@ def vqa(
     seed: Annotated[int, typer.Option(help="Random seed.", min=0, max=options.LARGEST_SEED)] = 7,
     vlm: Annotated[
         str,
-        choices.PROPOSERS.option(
+        option_values.PROPOSERS.option(
             help="Model that paraphrases the questions: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or none.",
             metavar="SPEC",
         ),

@@ -91,7 +91,9 @@ def similarity(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.minimum(one / one.sum(), other / other.sum()).sum())
 
 
-def halves_agreement(points_m: np.ndarray, one: np.ndarray, other: np.ndarray, spread_m: float) -> tuple[float, float]:
+def split_half_agreement(
+    points_m: np.ndarray, one: np.ndarray, other: np.ndarray, spread_m: float
+) -> tuple[float, float]:
     """Return SIM of the maps of two halves of the contacts, and the AUC of the first for the positive points of the second.
 
     ``points_m (N, 3)``, contacts ``(C, 3)`` each; positive points are those from ``POSITIVE``.

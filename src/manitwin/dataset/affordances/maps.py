@@ -18,11 +18,11 @@ from manitwin.dataset.affordances.heat_maps import (
     contact_points,
     contact_spread_m,
     function_map,
-    halves_agreement,
+    split_half_agreement,
     surface_distances,
 )
 from manitwin.dataset.affordances.sampled_grasps import sample_grasps
-from manitwin.geometry.frames.words import means_place
+from manitwin.geometry.frames.label_keywords import denotes_feature_itself
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
 from manitwin.models.graspers.protocol import GraspProposals
@@ -85,7 +85,7 @@ def surface_maps(twin: Twin, *, points: int, trials: int, seed: int, grippers: S
         for name, (contacts, of_grasp) in touches.items()
         if len(contacts) >= 2 * LEAST_CONTACTS
     }
-    maps |= _functions(twin, pool, normals, mesh.extents)
+    maps |= _function_maps(twin, pool, normals, mesh.extents)
     return SurfaceMaps(
         twin, pool, normals, face, twin.face_parts()[face], maps, len(sampled.held), int(sampled.held.sum()), agreement
     )
@@ -99,7 +99,7 @@ def _agreement(
     points_m: np.ndarray, contacts: np.ndarray, of_grasp: np.ndarray, spread_m: float, rng: np.random.Generator
 ) -> tuple[float, float]:
     half = (rng.permutation(int(of_grasp.max()) + 1) % 2 == 0)[of_grasp]
-    return halves_agreement(points_m, contacts[half], contacts[~half], spread_m)
+    return split_half_agreement(points_m, contacts[half], contacts[~half], spread_m)
 
 
 def _task_contacts(twin: Twin, caster: RayCaster, gripper: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -119,18 +119,20 @@ def _task_contacts(twin: Twin, caster: RayCaster, gripper: str) -> dict[str, tup
     return found
 
 
-def _functions(twin: Twin, points_m: np.ndarray, normals: np.ndarray, extents_m: np.ndarray) -> dict[str, np.ndarray]:
+def _function_maps(
+    twin: Twin, points_m: np.ndarray, normals: np.ndarray, extents_m: np.ndarray
+) -> dict[str, np.ndarray]:
     """Return the proximity map of each functional point; for an opening, the proximity to its rim."""
     found = {}
     for point in twin.record.points.functional if twin.record.points else ():
-        seeds = _seeds(point, points_m, normals)
+        seeds = _seed_indices(point, points_m, normals)
         distance_m = surface_distances(points_m, normals, seeds).min(0)
-        share = RIM_SHARE if _opens(point) else FUNCTION_SHARE
+        share = RIM_SHARE if _is_opening(point) else FUNCTION_SHARE
         found[f"function:{point.id} {point.label}"] = function_map(distance_m, extents_m, share)
     return found
 
 
-def _seeds(point: FunctionalPoint, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _seed_indices(point: FunctionalPoint, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Return the points from which the distance to a functional point is measured: the nearest one on the same side of the
     surface.
 
@@ -139,15 +141,15 @@ def _seeds(point: FunctionalPoint, points_m: np.ndarray, normals: np.ndarray) ->
     same_side = normals @ np.array(point.normal) > LEAST_COSINE
     away_m = np.linalg.norm(points_m - np.array(point.position_m), axis=1)
     nearest = int(np.where(same_side, away_m, away_m + away_m.max()).argmin())
-    if point.frame is None or not _opens(point):
+    if point.frame is None or not _is_opening(point):
         return np.array([nearest])
     spacing_m = float(np.median(cKDTree(points_m).query(points_m, 2)[0][:, 1]))
     return np.union1d(nearest, np.flatnonzero(away_from_feature_m(point.frame, points_m) <= 2 * spacing_m))
 
 
-def _opens(point: FunctionalPoint) -> bool:
+def _is_opening(point: FunctionalPoint) -> bool:
     """Return whether a functional point denotes an opening with a known rim."""
-    return point.frame is not None and point.frame.kind == "opening" and means_place(point.label, "opening")
+    return point.frame is not None and point.frame.kind == "opening" and denotes_feature_itself(point.label, "opening")
 
 
 def has_parts(maps: SurfaceMaps) -> bool:

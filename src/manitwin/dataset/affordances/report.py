@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from manitwin.dataset.affordances.blind import blind_parts
+from manitwin.dataset.affordances.baselines import baseline_part_accuracy
 from manitwin.dataset.affordances.maps import SurfaceMaps
 from manitwin.dataset.report_page import Picture, Section, Table, page
 from manitwin.formats.image_file import png_of
@@ -27,19 +27,19 @@ def sample_picture(maps: SurfaceMaps) -> Picture:
     """Draw a twin's points by part, and by its first three maps from blue (0) to red (1), far points first."""
     parts = np.array([PART_COLORS[part % len(PART_COLORS)] if part != NO_PART else NO_COLOR for part in maps.parts])
     shown = list(maps.maps)[:MOST_MAPS]
-    panels = [_dots(maps, parts), *(_dots(maps, _heat(maps.maps[name])) for name in shown)]
+    panels = [_draw_points(maps, parts), *(_draw_points(maps, _heat_colors(maps.maps[name])) for name in shown)]
     record = maps.twin.record
     category = record.language.category if record.language else "object"
     caption = f"{category}: {', '.join(['parts', *shown])}; {maps.held} of {maps.tried} grasps held"
     return Picture(png_of(np.concatenate(panels, axis=1)), caption)
 
 
-def _heat(values: np.ndarray) -> np.ndarray:
+def _heat_colors(values: np.ndarray) -> np.ndarray:
     levels = np.rint(255 * values).astype(np.uint8)[:, None]
     return np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_TURBO))[:, 0, ::-1]
 
 
-def _dots(maps: SurfaceMaps, colors: np.ndarray) -> np.ndarray:
+def _draw_points(maps: SurfaceMaps, colors: np.ndarray) -> np.ndarray:
     camera = framing_camera(
         maps.points_m, azimuth_deg=-50.0, elevation_deg=30.0, fov_y_deg=30.0, width_px=SIDE_PX, height_px=SIDE_PX
     )
@@ -51,7 +51,7 @@ def _dots(maps: SurfaceMaps, colors: np.ndarray) -> np.ndarray:
     return canvas
 
 
-def _blind(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
+def _baseline_table(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
     """Return the table of shape-blind baselines: medians by kind of map, and the accuracy for parts."""
     of_kind: dict[str, list[list[float | None]]] = {}
     for row in rows:
@@ -76,7 +76,7 @@ def _blind(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
         (kind, *(_median(values) for values in zip(*scores, strict=True)), *told.get(kind, (None, None)))
         for kind, scores in sorted(of_kind.items())
     ]
-    share, twins = blind_parts(rows)
+    share, twins = baseline_part_accuracy(rows)
     remark = (
         f" Of parts, {share:.0%} of the points are right where all are of the largest part of the category's other twins"
         f" ({twins:,} twins)."
@@ -111,7 +111,7 @@ def affordances_page(
         Table("Maps by kind.", ("map", "maps"), sorted(kinds.items())),
         Table("Twins by category.", ("category", "twins"), sorted(categories.items())),
     ]
-    tables += _blind(rows)
+    tables += _baseline_table(rows)
     if left_out:
         tables.append(Table("Left out.", ("twin", "reason"), sorted(left_out.items())))
     return page("Affordances and parts", lead, [Section("Samples", samples), Section("Balance", tables)])

@@ -17,8 +17,8 @@ from manitwin.physics.mujoco.trial import MujocoTrial
 from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.pipeline.trial_replay import settings_of_trial
 from manitwin.robots.grippers.gripper import Gripper
-from manitwin.robots.grippers.of_twins import gripper_of
 from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.robots.grippers.twin_grippers import find_gripper
 from manitwin.twin.grasp_summary import GraspSummary
 from manitwin.twin.loaded_twin import Twin
 
@@ -43,7 +43,7 @@ def sample_grasps(
     object are discarded before. Raises UsageError for a twin without a parallel-jaw gripper, with a gripper that is neither
     shipped nor among ``grippers``, or without a reproducible trial in its record.
     """
-    summary, gripper = _parallel(twin, grippers)
+    summary, gripper = _parallel_gripper(twin, grippers)
     body = twin.rigid_body()
     request = GraspRequest(
         solid=solid,
@@ -68,13 +68,13 @@ def sample_grasps(
     return SampledGrasps(summary.gripper, chosen, np.array([result.outcome == "held" for result in results], bool))
 
 
-def _parallel(twin: Twin, grippers: Sequence[Gripper]) -> tuple[GraspSummary, ParallelGripper]:
+def _parallel_gripper(twin: Twin, grippers: Sequence[Gripper]) -> tuple[GraspSummary, ParallelGripper]:
     """Return the first parallel-jaw gripper of a twin and its summary; contacts are only defined for parallel jaws."""
     first = twin.record.grasps
     assert first is not None
     others = [other.summary for other in first.other_grippers.values() if other.summary is not None]
     for summary in (first, *others):
-        gripper = gripper_of(summary.gripper, summary.gripper_sha256, grippers)
+        gripper = find_gripper(summary.gripper, summary.gripper_sha256, grippers)
         if isinstance(gripper, ParallelGripper):
             return summary, gripper
     names = ", ".join(summary.gripper for summary in (first, *others))

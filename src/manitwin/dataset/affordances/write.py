@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from manitwin.dataset.affordances.blind import blind_maps, part_shares
+from manitwin.dataset.affordances.baselines import baseline_scores, part_shares
 from manitwin.dataset.affordances.maps import SurfaceMaps, has_parts, surface_maps
 from manitwin.dataset.affordances.partnext import PartNextFolder
 from manitwin.dataset.affordances.report import affordances_page, sample_picture
@@ -34,7 +34,7 @@ SPLITS = (("train", 0.8), ("val", 0.1), ("test", 0.1))
 
 
 @dataclass(frozen=True)
-class Affordances:
+class AffordanceSummary:
     """Summary: twins with maps, twins with parts, twins left out with reasons, and the repeatability of the grasp maps."""
 
     twins: int
@@ -64,7 +64,7 @@ def write_affordances(
     seed: int = 0,
     grippers: Sequence[Gripper] = (),
     on_twin: Callable[[SurfaceMaps], None] = lambda maps: None,
-) -> Affordances:
+) -> AffordanceSummary:
     """Write the maps of all accepted twins of a local data set to ``out``, atomically.
 
     ``maps/<twin>.npz`` has the fields of 3D AffordanceNet. For twins with known parts, ``parts/`` has the layout of ShapeNetPart
@@ -121,7 +121,7 @@ def write_affordances(
         _write(folder / "report.html", affordances_page(rows, left_out, samples, with_parts))
     agreements = [row["agreement"]["grasp"] for row in rows if "grasp" in row["agreement"]]  # type: ignore[index, operator]
     sim, auc = np.nanmedian(np.array(agreements, float), axis=0) if agreements else (None, None)
-    return Affordances(
+    return AffordanceSummary(
         twins=len(rows),
         with_grasp_map=sum("grasp" in row["maps"] for row in rows),  # type: ignore[operator]
         with_parts=with_parts,
@@ -189,7 +189,7 @@ def _row(maps: SurfaceMaps) -> dict[str, object]:
         "tried": maps.tried,
         "held": maps.held,
         "agreement": {name: _rounded(values) for name, values in maps.agreement.items()},
-        "blind": {name: _rounded(astuple(scores)) for name, scores in blind_maps(maps).items()},
+        "blind": {name: _rounded(astuple(scores)) for name, scores in baseline_scores(maps).items()},
         "part_shares": {name: round(share, 4) for name, share in part_shares(maps).items()},
     }
 

@@ -10,7 +10,7 @@ from manitwin.dataset.index.near_duplicates import NearDuplicates
 SPLITS = (("train", 0.8), ("val", 0.1), ("test", 0.1))
 
 
-def groups_of(twin_ids: Sequence[str], near: NearDuplicates) -> dict[str, str]:
+def assign_groups(twin_ids: Sequence[str], near: NearDuplicates) -> dict[str, str]:
     """Return the group of each twin, named by its smallest id: the connected components of equal inputs and near duplicates."""
     first = {twin_id: twin_id for twin_id in twin_ids}
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.dataset.catalog.groups import SPLITS, groups_of, split_of
+from manitwin.dataset.catalog.groups import SPLITS, assign_groups, split_of
 from manitwin.dataset.catalog.surface import POINTS, SurfacePoints, View, surface_points, views_around
 from manitwin.dataset.index.near_duplicates import near_duplicates
 from manitwin.dataset.index.query import Index
@@ -19,7 +19,7 @@ from manitwin.dataset.report_page import Picture, Section, Table, page
 from manitwin.errors import TwinError, UsageError
 from manitwin.formats.image_file import png_of
 from manitwin.formats.label_picture import label_picture
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record import Language
@@ -68,7 +68,7 @@ def write_catalog(
     ids: list[str] = index.select("twins", columns=["twin_id"])["twin_id"].to_pylist()
     if not ids:
         raise UsageError(f"{dataset}: has no accepted twin; build twins, or give another data set")
-    groups = groups_of(ids, near_duplicates(index))
+    groups = assign_groups(ids, near_duplicates(index))
     rows: list[dict[str, Any]] = []
     left_out: dict[str, str] = {}
     samples: list[Picture] = []
@@ -111,7 +111,7 @@ def _row(twin: Twin, group: str) -> dict[str, Any]:
         "twin_id": record.twin_id,
         "revision": record.revision,
         "category": language.category,
-        "taxonomy": taxonomy_of(language.category),
+        "taxonomy": taxonomy_name(language.category),
         "split": split_of(group),
         "group": group,
         "captions": list(dict.fromkeys([language.caption, *language.captions])),
@@ -126,7 +126,7 @@ def _attributes(language: Language) -> dict[str, str]:
     return {name: getattr(language, name) for name in ("color", "material", "size", "shape", "function")}
 
 
-def taxonomy_of(category: str) -> str:
+def taxonomy_name(category: str) -> str:
     """Return a category as a file name without hyphens and dots, at which ULIP's readers split names."""
     return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in category) or "object"
 
@@ -194,7 +194,9 @@ def _write_lists(folder: Path, rows: list[dict[str, Any]], left_out: dict[str, s
     _write(folder / "ulip" / "labels.json", canonical_json({DATASET: categories}).encode())
     for split, _ in SPLITS:
         there = [row for row in rows if row["split"] == split]
-        _write(folder / "openshape" / f"{split}.json", canonical_json([_openshape(row) for row in there]).encode())
+        _write(
+            folder / "openshape" / f"{split}.json", canonical_json([_openshape_entry(row) for row in there]).encode()
+        )
         _write(folder / "ulip" / f"{split}.txt", "".join(f"{row['ulip']}\n" for row in there).encode())
         labelled = [f"{each['file']} {numbers[row['category']]}\n" for row in there for each in row["pictures"]]
         _write(folder / "classification" / f"{split}.txt", "".join(labelled).encode())
@@ -203,13 +205,13 @@ def _write_lists(folder: Path, rows: list[dict[str, Any]], left_out: dict[str, s
 
 
 def _synset(rows: list[dict[str, Any]], category: str) -> dict[str, Any]:
-    prior = lookup(category)
+    prior = find_prior(category)
     names = dict.fromkeys([category, *((prior.category, *prior.aliases) if prior else ())])
     count = sum(row["category"] == category for row in rows)
-    return {"synsetId": taxonomy_of(category), "name": ",".join(names), "children": [], "numInstances": count}
+    return {"synsetId": taxonomy_name(category), "name": ",".join(names), "children": [], "numInstances": count}
 
 
-def _openshape(row: dict[str, Any]) -> dict[str, str]:
+def _openshape_entry(row: dict[str, Any]) -> dict[str, str]:
     return {
         "id": row["twin_id"],
         "dataset": DATASET,

@@ -41,17 +41,17 @@ class Facts(NamedTuple):
     size_source: str | None
 
 
-def facts_of(name: str | None, size_m: float | None) -> Facts:
+def infer_facts(name: str | None, size_m: float | None) -> Facts:
     """Return the facts that a name implies. The size is ``size_m`` (longest axis) if given, else the typical size of the prior.
 
     A name that matches no prior leaves category, group and size unknown.
     """
-    known = _of_name(name or "")
+    known = _facts_from_name(name or "")
     return known if size_m is None else known._replace(size_m=size_m, size_source="given")
 
 
 @lru_cache(maxsize=8192)
-def _of_name(name: str) -> Facts:
+def _facts_from_name(name: str) -> Facts:
     prior = named(name) if name else None
     if prior is None or prior.category == UNKNOWN:
         return Facts(UNKNOWN, UNKNOWN, None, None)
@@ -64,10 +64,10 @@ def name_of_file(stem: str, folder: str) -> str | None:
     claw hammer.
     """
     words = (" ".join(_COUNTING.sub(" ", text).split()) for text in (stem, folder))
-    return next((each for each in words if each and _of_name(each).category != UNKNOWN), None)
+    return next((each for each in words if each and _facts_from_name(each).category != UNKNOWN), None)
 
 
-def band_of(size_m: float | None) -> str:
+def size_band_of(size_m: float | None) -> str:
     """Return the size band of a longest axis in metres as text in centimetres; ``unknown`` for None."""
     if size_m is None:
         return UNKNOWN
@@ -80,5 +80,5 @@ def band_of(size_m: float | None) -> str:
     return f"above {edges[-1]} cm"
 
 
-BANDS = (*(band_of(size) for size in (0.01, *SIZE_BANDS_M[1:], 1.0)), UNKNOWN)
+BANDS = (*(size_band_of(size) for size in (0.01, *SIZE_BANDS_M[1:], 1.0)), UNKNOWN)
 """All bands, smallest first."""

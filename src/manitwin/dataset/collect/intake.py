@@ -10,15 +10,15 @@ from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
-from manitwin.dataset.collect.facts import UNKNOWN, band_of, facts_of, name_of_file
-from manitwin.dataset.collect.listed import (
-    Listed,
-    Unreadable,
-    example_of,
+from manitwin.dataset.collect.facts import UNKNOWN, infer_facts, name_of_file, size_band_of
+from manitwin.dataset.collect.list_parsing import (
+    EntryError,
+    ListEntry,
     licence_or_none,
+    line_location,
     read_list,
 )
-from manitwin.dataset.collect.places import require_place
+from manitwin.dataset.collect.place_check import require_place
 from manitwin.dataset.collect.store import Catalogue, Kind, Refused, Row
 from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import open_regular
@@ -36,7 +36,7 @@ _CAUSE_CHARACTERS, _CAUSES = 200, 1000
 
 
 @dataclass(frozen=True)
-class Given:
+class DefaultValues:
     """Values from the command line for all inputs; values of a list entry take precedence."""
 
     source: str | None = None
@@ -46,7 +46,7 @@ class Given:
 
 
 @dataclass
-class Added:
+class IntakeSummary:
     """Outcome for the entries of one folder or list: new, changed and unchanged rows, and entries that became no row."""
 
     new: int = 0
@@ -65,14 +65,14 @@ class Added:
         return self.new + self.changed + self.unchanged + self.repeated + sum(r.count for r in self.refused)
 
 
-def add(catalogue: Path, given_place: Path, given: Given, root: Path | None = None) -> Added:
+def add_inputs(catalogue: Path, given_place: Path, given: DefaultValues, root: Path | None = None) -> IntakeSummary:
     """Add a folder of photos and meshes, or a CSV or JSONL list, to a catalogue, which is created if missing.
 
     The files of a list are relative to ``root``, by default the folder of the list. For the published listing of a data set,
     entries refer to files only if ``root`` is given, else to their URLs. Raises UsageError for any other place, for a list that
     is malformed as a whole (nothing of it is added), and if the source is not stated.
     """
-    _require_usable(given)
+    _require_valid_defaults(given)
     require_place(given_place, given.source, root)
     listing = not given_place.is_dir()
     if listing and not _rows_of(given_place, files=root is not None):
@@ -82,7 +82,7 @@ def add(catalogue: Path, given_place: Path, given: Given, root: Path | None = No
         return _Intake(store, given_place, given, below, files=root is not None).run()
 
 
-def _require_usable(given: Given) -> None:
+def _require_valid_defaults(given: DefaultValues) -> None:
     for option, column, value in (
         ("source", "name", given.source),
         ("licence", "license", given.licence),
@@ -101,14 +101,14 @@ def _rows_of(path: Path, *, files: bool) -> int:
 class _Intake:
     """Adds one folder or list to a catalogue."""
 
-    def __init__(self, store: Catalogue, place: Path, given: Given, root: Path, *, files: bool):
+    def __init__(self, store: Catalogue, place: Path, given: DefaultValues, root: Path, *, files: bool):
         self._store, self._place, self._given, self._files = store, place, given, files
         self._root = Path(os.path.realpath(root))
         self._causes: dict[str, tuple[int, str]] = {}
         self._seen: set[str] = set()
-        self._added = Added()
+        self._added = IntakeSummary()
 
-    def run(self) -> Added:
+    def run(self) -> IntakeSummary:
         entries = self._folder() if self._place.is_dir() else self._list()
         while batch := list(islice(entries, BATCH)):
             self._put(batch)
@@ -133,21 +133,21 @@ class _Intake:
         for file in listing.inputs:
             path = os.path.realpath(file.parent) + os.sep + file.name
             name = self._given.name or name_of_file(file.stem, file.parent.name)
-            row = self._row(Listed(path, None, name, None, None, None, None), str(file))
+            row = self._row(ListEntry(path, None, name, None, None, None, None), str(file))
             if row is not None:
                 yield row
 
     def _list(self) -> Iterator[Row]:
         for line, listed in read_list(self._place, files=self._files):
-            example = example_of(self._place, line)
-            if isinstance(listed, Unreadable):
+            example = line_location(self._place, line)
+            if isinstance(listed, EntryError):
                 self._refuse(str(listed), example)
             elif not (listed.source or self._given.source):
                 self._refuse("has no source; give a column 'source', or --source", example)
             elif (row := self._row(listed, example)) is not None:
                 yield row
 
-    def _row(self, listed: Listed, example: str) -> Row | None:
+    def _row(self, listed: ListEntry, example: str) -> Row | None:
         place = listed.url or os.path.normpath(os.path.join(self._root, listed.file or ""))
         if _utf8(place) is None:
             self._refuse("its name is not UTF-8; rename the file", example)
@@ -162,7 +162,7 @@ class _Intake:
             )
             return None
         self._seen.add(place)
-        facts = facts_of(listed.name or self._given.name, listed.size_m)
+        facts = infer_facts(listed.name or self._given.name, listed.size_m)
         return Row(
             place=place,
             kind=kind,
@@ -174,7 +174,7 @@ class _Intake:
             grp=facts.group,
             size_m=facts.size_m,
             size_source=facts.size_source,
-            size_band=band_of(facts.size_m),
+            size_band=size_band_of(facts.size_m),
             sha256=None,
             bytes=None,
             modified_ns=None,
@@ -187,7 +187,7 @@ class _Intake:
         changed = []
         for new in batch:
             before = known.get(new.place)
-            told = new if before is None else _kept(new, before)
+            told = new if before is None else _merge_row(new, before)
             row = told if told.kind == "url" else _read(told, before, self._root)
             if row.status == "unreadable":
                 self._added.unreadable[row.cause or ""] = self._added.unreadable.get(row.cause or "", 0) + 1
@@ -218,24 +218,24 @@ def _read(row: Row, before: Row | None, root: Path) -> Row:
     """
     path = Path(row.place, IMPORTED_MESH) if row.kind == "asset" else Path(row.place)
     try:
-        with open_regular(path, Unreadable, inside=root, name="file") as stream:
+        with open_regular(path, EntryError, inside=root, name="file") as stream:
             found = os.fstat(stream.fileno())
             size, at = found.st_size, found.st_mtime_ns
             if size == 0:
-                raise Unreadable("is empty")
+                raise EntryError("is empty")
             if size > MAX_INPUT_BYTES:
-                raise Unreadable(f"is larger than {MAX_INPUT_BYTES >> 30} GiB")
+                raise EntryError(f"is larger than {MAX_INPUT_BYTES >> 30} GiB")
             if before is not None and before.sha256 and (before.bytes, before.modified_ns) == (size, at):
                 digest = before.sha256
             else:
                 digest = _digest(stream)
-    except (Unreadable, OSError) as error:
+    except (EntryError, OSError) as error:
         said = error.strerror or "cannot be read" if isinstance(error, OSError) else str(error).removeprefix("file: ")
         return replace(row, status="unreadable", cause=printable_line(said, max_characters=_CAUSE_CHARACTERS))
     return replace(row, status="ready", sha256=digest, bytes=size, modified_ns=at)
 
 
-def _kept(row: Row, before: Row) -> Row:
+def _merge_row(row: Row, before: Row) -> Row:
     """Return the new row with its unknown values filled in from the previous row."""
     if row.licence == UNKNOWN:
         row = replace(row, licence=before.licence)

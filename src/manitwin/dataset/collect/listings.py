@@ -57,10 +57,10 @@ def read_listing(path: Path, *, files: bool) -> Iterator[tuple[int, dict[str, An
     if isinstance(told, dict) and told and all(isinstance(each, dict) and "license" in each for each in told.values()):
         shard = path.name.split(".", 1)[0]
         for number, (uid, each) in enumerate(told.items(), 1):
-            yield number, _of_objaverse(uid, each, shard, files=files)
+            yield number, _objaverse_row(uid, each, shard, files=files)
     elif isinstance(told, list) and told and all(isinstance(each, dict) and "owner" in each for each in told):
         for number, each in enumerate(told, 1):
-            yield number, _of_fuel(each, files=files)
+            yield number, _fuel_row(each, files=files)
     else:
         raise UsageError(
             f"{path}: is not a known listing; give Objaverse's metadata (an object of annotations by uid) or Fuel's"
@@ -83,7 +83,7 @@ def _text(path: Path) -> bytes:
     return content
 
 
-def _of_objaverse(uid: str, told: dict[str, Any], shard: str, *, files: bool) -> dict[str, Any]:
+def _objaverse_row(uid: str, told: dict[str, Any], shard: str, *, files: bool) -> dict[str, Any]:
     said = told.get("user")
     user: dict[str, Any] = said if isinstance(said, dict) else {}
     address = told.get("viewerUrl") or f"{SKETCHFAB}/{quote(uid)}"
@@ -95,7 +95,7 @@ def _of_objaverse(uid: str, told: dict[str, Any], shard: str, *, files: bool) ->
     )
 
 
-def _of_fuel(told: dict[str, Any], *, files: bool) -> dict[str, Any]:
+def _fuel_row(told: dict[str, Any], *, files: bool) -> dict[str, Any]:
     owner, name = told.get("owner"), told.get("name")
     if not isinstance(owner, str) or not isinstance(name, str):
         return {"name": name, "source": owner}  # a row without a place is refused later

@@ -18,8 +18,8 @@ from manitwin.formats.image_file import read_image
 from manitwin.formats.meshes.read import read_mesh
 from manitwin.formats.meshes.source import MeshLimits
 from manitwin.geometry.sampling import sample_surface
-from manitwin.models.embedders.looks import LENGTH, look_of
-from manitwin.render.raycast import merged
+from manitwin.models.embedders.appearance import LENGTH, appearance_descriptor
+from manitwin.render.raycast import merge_parts
 from manitwin.twin.import_record import IMPORTED_MESH
 
 VERSION = 1
@@ -40,7 +40,7 @@ _LIMITS = MeshLimits(max_bytes=1 << 28, max_faces=2_000_000, decode_textures=Fal
 def look_of_input(place: str, kind: str) -> bytes | None:
     """Return the feature vector of a file as little-endian ``float16`` bytes; None if the file is broken or shows nothing."""
     try:
-        vector = picture_look(_rgb(Path(place))) if kind == "image" else _shape(Path(place), kind)
+        vector = picture_feature(_rgb(Path(place))) if kind == "image" else _shape(Path(place), kind)
     except (ManiTwinError, ValueError):
         return None
     return vector.astype("<f2").tobytes()
@@ -63,9 +63,9 @@ def _rgb(path: Path) -> np.ndarray:
     return np.asarray(np.rint(pixels[..., :3] * share + 255 * (1 - share)), np.uint8)
 
 
-def picture_look(rgb: np.ndarray) -> np.ndarray:
+def picture_feature(rgb: np.ndarray) -> np.ndarray:
     """Return the unit feature vector ``(256,) float32`` of a picture ``(H, W, 3) uint8``."""
-    whole = look_of(rgb, np.ones(rgb.shape[:2], np.float32))
+    whole = appearance_descriptor(rgb, np.ones(rgb.shape[:2], np.float32))
     projected = _projection() @ whole
     return np.asarray(projected / max(float(np.linalg.norm(projected)), 1e-9), np.float32)
 
@@ -76,11 +76,11 @@ def _projection() -> np.ndarray:
 
 def _shape(path: Path, kind: str) -> np.ndarray:
     file = path / IMPORTED_MESH if kind == "asset" else path
-    mesh = merged(read_mesh(file, limits=_LIMITS).parts)
-    return shape_look(mesh)
+    mesh = merge_parts(read_mesh(file, limits=_LIMITS).parts)
+    return shape_feature(mesh)
 
 
-def shape_look(mesh: trimesh.Trimesh) -> np.ndarray:
+def shape_feature(mesh: trimesh.Trimesh) -> np.ndarray:
     """Return the shape vector ``(67,) float32`` of a surface; raises ValueError for a surface without area."""
     if not float(mesh.area) > 0:
         raise ValueError("a surface without area has no shape")

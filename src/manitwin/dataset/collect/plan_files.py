@@ -10,7 +10,7 @@ from pathlib import Path
 
 from manitwin.dataset.collect.planning import CollectPlan
 from manitwin.formats.output_folder import require_writable_folder
-from manitwin.pipeline.masks_beside import masks_of_photos
+from manitwin.pipeline.mask_matching import masks_beside_photos
 from manitwin.twin.import_record import IMPORTED_MESH
 from manitwin.twin.store import write_bytes_atomically
 
@@ -27,7 +27,7 @@ def write_plan(plan: CollectPlan, folder: Path) -> list[Path]:
     """
     require_writable_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    masks = masks_of_photos([Path(row.place) for row in plan.chosen if row.kind == "image"])
+    masks = masks_beside_photos([Path(row.place) for row in plan.chosen if row.kind == "image"])
     built = [
         (
             str(Path(row.place, IMPORTED_MESH)) if row.kind == "asset" else row.place,

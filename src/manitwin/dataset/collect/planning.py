@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from manitwin.dataset.collect.facts import BANDS, GROUPS, UNKNOWN, band_of, facts_of
-from manitwin.dataset.collect.sentences import SENTENCES, sentence
+from manitwin.dataset.collect.facts import BANDS, GROUPS, UNKNOWN, infer_facts, size_band_of
+from manitwin.dataset.collect.prompt_templates import SENTENCES, format_prompt
 from manitwin.dataset.collect.store import Row
 from manitwin.models.annotators.priors import load_priors
 
@@ -57,7 +57,7 @@ def plan_inputs(
     }
     left_out: dict[str, int] = defaultdict(int)
     for row in rows:
-        why = _why_left_out(row, licenses)
+        why = _exclusion_reason(row, licenses)
         if why is not None:
             left_out[why] += 1
         else:
@@ -67,7 +67,7 @@ def plan_inputs(
     prompts: list[Prompt] = []
     there = {}
     for group, count in zip(GROUPS, wanted, strict=True):
-        of_group = _in_turn(by_cell[group], count, seed)
+        of_group = _round_robin(by_cell[group], count, seed)
         there[group] = len(of_group)
         chosen += of_group
         prompts += _prompts(group, count - len(of_group), of_group, seed)
@@ -86,7 +86,7 @@ def shares(items: int, parts: int) -> list[int]:
     return [items // parts + (number < items % parts) for number in range(parts)]
 
 
-def _why_left_out(row: Row, licenses: Sequence[str] | None) -> str | None:
+def _exclusion_reason(row: Row, licenses: Sequence[str] | None) -> str | None:
     if row.kind == "url":
         return "an address, which nothing is fetched from"
     if licenses is None and row.licence == UNKNOWN:
@@ -100,13 +100,13 @@ def _why_left_out(row: Row, licenses: Sequence[str] | None) -> str | None:
     return None if row.size_band in INSIDE else "size outside of 2 to 37 cm"
 
 
-def _in_turn(bands: Mapping[str, Mapping[str, list[Row]]], count: int, seed: int) -> list[Row]:
+def _round_robin(bands: Mapping[str, Mapping[str, list[Row]]], count: int, seed: int) -> list[Row]:
     """Return up to ``count`` rows, alternating over the bands and, within a band, over the categories."""
     queues = []
     for band in INSIDE:
         categories = bands.get(band, {})
         shuffled = [
-            sorted(categories[name], key=lambda row: _drawn(seed, row.sha256 or row.place))
+            sorted(categories[name], key=lambda row: _random_key(seed, row.sha256 or row.place))
             for name in sorted(categories)
         ]
         turns = max(map(len, shuffled), default=0)
@@ -126,7 +126,7 @@ def _prompts(group: str, count: int, there: Sequence[Row], seed: int) -> list[Pr
     priors = [
         prior
         for name, prior in sorted(load_priors().items())
-        if name != UNKNOWN and (said := facts_of(name, None)).group == group and band_of(said.size_m) in INSIDE
+        if name != UNKNOWN and (said := infer_facts(name, None)).group == group and size_band_of(said.size_m) in INSIDE
     ]
     if not priors:
         return []
@@ -143,9 +143,9 @@ def _prompts(group: str, count: int, there: Sequence[Row], seed: int) -> list[Pr
             if have[prior.category] + asked[prior.category] == least:
                 number = asked[prior.category]
                 asked[prior.category] += 1
-                made.append(Prompt(sentence(prior, number % len(SENTENCES), rng), prior.category))
+                made.append(Prompt(format_prompt(prior, number % len(SENTENCES), rng), prior.category))
     return made
 
 
-def _drawn(seed: int, key: str) -> bytes:
+def _random_key(seed: int, key: str) -> bytes:
     return hashlib.sha256(f"{seed}\0{key}".encode()).digest()

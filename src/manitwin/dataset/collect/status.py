@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from manitwin.dataset.collect.facts import BANDS, GROUPS, UNKNOWN
-from manitwin.dataset.collect.store import Catalogue, Refused, by_each
+from manitwin.dataset.collect.store import Catalogue, Refused, counts_by_column
 from manitwin.formats.printable import printable_line
 
 STATES = ("ready", "listed", "duplicate", "unreadable")
@@ -63,12 +63,12 @@ def catalogue_status(path: Path) -> CatalogueStatus:
         usable = sum(
             count for (_, status, licence, *_), count in counts if status in ("ready", "listed") and licence != UNKNOWN
         )
-        each = {name: _ordered(name, found) for name, found in by_each(counts).items()}
+        each = {name: _ordered(name, found) for name, found in counts_by_column(counts).items()}
         return CatalogueStatus(
             rows=sum(count for _, count in counts),
             licence_known=usable,
             counts=each,
-            unreadable=catalogue.causes(),
+            unreadable=catalogue.unreadable_counts(),
             refused=catalogue.refused(),
         )
 

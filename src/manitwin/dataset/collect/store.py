@@ -14,8 +14,8 @@ from manitwin.dataset.collect.facts import BANDS, GROUPS, UNKNOWN
 from manitwin.dataset.collect.schema import APPLICATION, MIGRATIONS, migrate
 from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import open_regular
-from manitwin.formats.schema_version import of_newer_schema
-from manitwin.formats.sqlite_store import BUSY_S, damaged, errors_named, flaw_in, transaction
+from manitwin.formats.schema_version import newer_schema_message
+from manitwin.formats.sqlite_store import BUSY_S, damaged_file_error, name_file_in_errors, schema_flaw, transaction
 
 Kind = Literal["image", "mesh", "asset", "url"]
 Status = Literal["ready", "listed", "duplicate", "unreadable"]
@@ -84,7 +84,7 @@ class Catalogue:
         if not fresh:
             with open_regular(path, UsageError, name=str(path)) as stream:
                 fresh = os.fstat(stream.fileno()).st_size == 0
-        with self._sound():
+        with self._sqlite_errors():
             self._connection = sqlite3.connect(path, isolation_level=None, timeout=BUSY_S)
             try:
                 self._open(fresh and make)
@@ -103,10 +103,10 @@ class Catalogue:
                 f"{self.path}: is not a catalogue; give one that `manitwin collect add` made, or a new name"
             )
         if version > len(MIGRATIONS):
-            raise UsageError(of_newer_schema(self.path, version, len(MIGRATIONS)))
+            raise UsageError(newer_schema_message(self.path, version, len(MIGRATIONS)))
         migrate(self._connection, version)
-        if (flaw := flaw_in(self._connection, migrate, tables_of="a catalogue")) is not None:
-            raise damaged(self.path, flaw, _DAMAGED)
+        if (flaw := schema_flaw(self._connection, migrate, tables_of="a catalogue")) is not None:
+            raise damaged_file_error(self.path, flaw, _DAMAGED)
 
     def __enter__(self) -> Catalogue:
         return self
@@ -118,7 +118,7 @@ class Catalogue:
         """Return the existing rows of some places, keyed by place; duplicates are returned as ready."""
         found = {}
         for place in places:
-            with self._sound():
+            with self._sqlite_errors():
                 row = self._connection.execute(
                     f"SELECT {', '.join(_COLUMNS)} FROM inputs WHERE place = ?", (place,)
                 ).fetchone()
@@ -154,16 +154,16 @@ class Catalogue:
             )
             connection.execute(_MARK_ALIKE)
 
-    def without_look(self, version: int) -> list[tuple[str, str, str]]:
+    def files_without_feature(self, version: int) -> list[tuple[str, str, str]]:
         """Return digest, place and kind of each ready file without a vector of this version, in catalogue order."""
-        with self._sound():
+        with self._sqlite_errors():
             return self._connection.execute(
                 "SELECT sha256, place, kind FROM inputs WHERE status = 'ready' AND sha256 IS NOT NULL AND NOT EXISTS"
                 " (SELECT 1 FROM looks WHERE looks.sha256 = inputs.sha256 AND version = ?) ORDER BY number",
                 (version,),
             ).fetchall()
 
-    def put_looks(self, version: int, looks: Iterable[tuple[str, bytes | None]]) -> None:
+    def put_features(self, version: int, looks: Iterable[tuple[str, bytes | None]]) -> None:
         """Store the vectors of files by their digests."""
         with self._writing() as connection:
             connection.executemany(
@@ -171,16 +171,16 @@ class Catalogue:
                 [(digest, version, look) for digest, look in looks],
             )
 
-    def looks(self, version: int) -> list[tuple[str, str, bytes]]:
+    def features(self, version: int) -> list[tuple[str, str, bytes]]:
         """Return digest, kind and vector of each file that has one, in catalogue order, one per distinct content."""
-        with self._sound():
+        with self._sqlite_errors():
             return self._connection.execute(
                 "SELECT inputs.sha256, kind, look FROM inputs JOIN looks USING (sha256) WHERE version = ? AND look IS NOT NULL"
                 " AND number = (SELECT min(number) FROM inputs AS same WHERE same.sha256 = inputs.sha256) ORDER BY number",
                 (version,),
             ).fetchall()
 
-    def put_alike(self, alike: Mapping[str, str]) -> None:
+    def put_near_duplicates(self, alike: Mapping[str, str]) -> None:
         """Replace the near-duplicate relations (digest to digest of the earlier file) and mark the duplicates."""
         with self._writing() as connection:
             connection.execute(
@@ -195,7 +195,7 @@ class Catalogue:
 
     def ready(self) -> Iterator[Row]:
         """Yield the usable rows, including URLs, in catalogue order."""
-        with self._sound():
+        with self._sqlite_errors():
             cursor = self._connection.execute(
                 f"SELECT {', '.join(_COLUMNS)} FROM inputs WHERE status IN ('ready', 'listed') ORDER BY number"
             )
@@ -206,7 +206,7 @@ class Catalogue:
 
     def counts(self) -> list[tuple[tuple[str, ...], int]]:
         """Return the number of rows per combination of values of ``COUNTED``."""
-        with self._sound():
+        with self._sqlite_errors():
             rows = self._connection.execute(
                 "SELECT grp, status, licence, source, size_band, count(*) FROM inputs GROUP BY 1, 2, 3, 4, 5"
             ).fetchall()
@@ -216,9 +216,9 @@ class Catalogue:
 
     def _require_known(self, group: str, band: str) -> None:
         if group not in (*GROUPS, UNKNOWN) or band not in BANDS:
-            raise damaged(self.path, f"a row of group {group!r} and size {band!r}", _DAMAGED)
+            raise damaged_file_error(self.path, f"a row of group {group!r} and size {band!r}", _DAMAGED)
 
-    def causes(self) -> dict[str, int]:
+    def unreadable_counts(self) -> dict[str, int]:
         """Return the number of unreadable rows by cause."""
         return self._pairs(
             "SELECT cause, count(*) FROM inputs WHERE status = 'unreadable' GROUP BY 1 ORDER BY 2 DESC, 1"
@@ -226,24 +226,24 @@ class Catalogue:
 
     def refused(self) -> list[Refused]:
         """Return the refused entries by list and cause."""
-        with self._sound():
+        with self._sqlite_errors():
             rows = self._connection.execute("SELECT * FROM refused ORDER BY list, count DESC, cause").fetchall()
         return [Refused(*row) for row in rows]
 
     def _pairs(self, sql: str) -> dict[str, int]:
-        with self._sound():
+        with self._sqlite_errors():
             return dict(self._connection.execute(sql).fetchall())
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        with self._sound(), transaction(self._connection):
+        with self._sqlite_errors(), transaction(self._connection):
             yield self._connection
 
-    def _sound(self) -> AbstractContextManager[None]:
-        return errors_named(self.path, _DAMAGED)
+    def _sqlite_errors(self) -> AbstractContextManager[None]:
+        return name_file_in_errors(self.path, _DAMAGED)
 
 
-def by_each(counts: Iterable[tuple[tuple[str, ...], int]]) -> Mapping[str, dict[str, int]]:
+def counts_by_column(counts: Iterable[tuple[tuple[str, ...], int]]) -> Mapping[str, dict[str, int]]:
     """Return the number of rows per value of each column of ``COUNTED``."""
     found: dict[str, dict[str, Any]] = {name: {} for name in COUNTED}
     for values, count in counts:

@@ -13,17 +13,17 @@ import trimesh
 from manitwin.dataset.evaluation.annotation_scores import (
     DIMENSIONS,
     Score,
-    scores_of,
+    score_annotations,
 )
 from manitwin.dataset.evaluation.labels import read_labels
-from manitwin.dataset.evaluation.part_names import matches
+from manitwin.dataset.evaluation.part_names import is_same_part
 from manitwin.engine.ledger.location import local_ledger
 from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
 from manitwin.formats.json_file import parse_json_object
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin, TwinSource
-from manitwin.twin.shares import wilson_interval
+from manitwin.twin.proportions import wilson_interval
 
 SHOWN = 5
 
@@ -55,7 +55,7 @@ class AnnotationReport:
             for name in (score.dimension, *([f"{score.dimension}: {kind}"] if kind else [])):
                 right, asked = counts.get(name, (0, 0))
                 counts[name] = right + score.right, asked + 1
-        return {name: counts[name] for name in sorted(counts, key=_place)}
+        return {name: counts[name] for name in sorted(counts, key=_sort_key)}
 
     def lines(self) -> list[str]:
         """Return the table as text, then the distances, then the wrong answers."""
@@ -94,13 +94,13 @@ def evaluate_annotations(dataset: str, labels: Path) -> AnnotationReport:
     distances: list[PointDistance] = []
     missing, found = [], 0
     for label in known:
-        twin_id = label.twin_id or _twin_of(label.file, paths)
+        twin_id = label.twin_id or _find_twin_id(label.file, paths)
         twin = source.twin(twin_id) if twin_id in twin_ids and twin_id is not None else None
         if twin is None or twin.record.status != "accepted":
             missing.append(label.file or str(label.twin_id))
             continue
         found += 1
-        scores += scores_of(twin.record, label)
+        scores += score_annotations(twin.record, label)
         distances += _distances(twin)
     if not found:
         raise UsageError(
@@ -109,7 +109,7 @@ def evaluate_annotations(dataset: str, labels: Path) -> AnnotationReport:
     return AnnotationReport(found, tuple(scores), tuple(distances), tuple(missing))
 
 
-def _place(name: str) -> tuple[int, str]:
+def _sort_key(name: str) -> tuple[int, str]:
     return DIMENSIONS.index(name.partition(":")[0]), name
 
 
@@ -128,7 +128,7 @@ def _path_of(item: str, ledger: Path) -> str:
     return str(said.get("file") or "")
 
 
-def _twin_of(file: str, paths: Mapping[str, str]) -> str | None:
+def _find_twin_id(file: str, paths: Mapping[str, str]) -> str | None:
     """Return the twin whose input path ends in ``file``; raises UsageError if there are several."""
     wanted = PurePosixPath(file).parts
     found = {
@@ -146,7 +146,7 @@ def _distances(twin: Twin) -> Iterable[PointDistance]:
         return
     triangles = face_parts = None
     for point in points.functional:
-        named = [place for place, part in enumerate(parts) if matches(part.name, point.label)]
+        named = [place for place, part in enumerate(parts) if is_same_part(part.name, point.label)]
         if named and triangles is None:
             triangles = np.concatenate([np.asarray(mesh.triangles) for mesh in twin.visual])
             face_parts = twin.face_parts()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from manitwin.dataset.evaluation import paper
+from manitwin.dataset.evaluation import paper_figures
 from manitwin.dataset.evaluation.input_likeness import Likeness, Models, likeness_of_twins
 from manitwin.dataset.evaluation.quality_table import quality_rows, sample_pictures, twin_rows
 from manitwin.dataset.evaluation.tables import EvaluationReport, EvaluationTable
@@ -81,7 +81,7 @@ def evaluate_generation(
         EvaluationTable(
             "beside_the_paper",
             "Beside the paper (table 4, section 5.3).",
-            _beside(tables),
+            _comparison_rows(tables),
             "The paper gives no intervals.",
         ),
         EvaluationTable.of(sources),
@@ -89,30 +89,36 @@ def evaluate_generation(
         EvaluationTable("twins", "Likeness of each twin.", twin_rows(found), printed=False),
     ]
     return EvaluationReport(
-        "Generation", _lead(dataset, sources.rows, found), shown, models.said(), sample_pictures(found)
+        "Generation", _lead(dataset, sources.rows, found), shown, models.describe_models(), sample_pictures(found)
     )
 
 
-def _beside(tables: ReportTables) -> list[Row]:
+def _comparison_rows(tables: ReportTables) -> list[Row]:
     twins, success = tables.result(_TWINS).only, tables.result(_SUCCESS).only
     count = twins["objects"]
     rows = [
-        paper.beside(
-            *("3D generation success rate", success["share"], paper.GENERATION_SUCCESS, "in part"),
+        paper_figures.comparison_row(
+            *("3D generation success rate", success["share"], paper_figures.GENERATION_SUCCESS, "in part"),
             "images and texts that could be read, through generation and the quality gate; there the gate asks a VLM, here "
             "what the build named; other inputs, and templates of texts cannot fail as a generator does",
             interval=(success["low"], success["high"]),
             objects=success["entered"],
         ),
-        *paper.grasp_rows(twins, tables.result(VERIFICATION_RATE).rows),
+        *paper_figures.grasp_rows(twins, tables.result(VERIFICATION_RATE).rows),
     ]
     size = "inputs differ; the paper's own figure shows 5 to 50 cm"
     return [
         *rows,
-        paper.beside("objects", count, paper.OBJECTS, "no", "a matter of what was built"),
-        paper.beside("categories", twins["categories"], paper.CATEGORIES, "no", "a matter of what was built"),
-        paper.beside("smallest longest side, m", twins["smallest_m"], paper.SMALLEST_M, "in part", size, objects=count),
-        paper.beside("largest longest side, m", twins["largest_m"], paper.LARGEST_M, "in part", size, objects=count),
+        paper_figures.comparison_row("objects", count, paper_figures.OBJECTS, "no", "a matter of what was built"),
+        paper_figures.comparison_row(
+            "categories", twins["categories"], paper_figures.CATEGORIES, "no", "a matter of what was built"
+        ),
+        paper_figures.comparison_row(
+            "smallest longest side, m", twins["smallest_m"], paper_figures.SMALLEST_M, "in part", size, objects=count
+        ),
+        paper_figures.comparison_row(
+            "largest longest side, m", twins["largest_m"], paper_figures.LARGEST_M, "in part", size, objects=count
+        ),
     ]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manitwin.dataset.evaluation.paper import grasp_rows
+from manitwin.dataset.evaluation.paper_figures import grasp_rows
 from manitwin.dataset.evaluation.tables import EvaluationReport, EvaluationTable
 from manitwin.dataset.statistics.grasp_queries import GRASPS_PER_OBJECT, OUTCOMES, SECOND_ENGINE, VERIFICATION_RATE
 from manitwin.dataset.statistics.query import Query, ReportTables
@@ -14,7 +14,7 @@ _OCTANT = """(2 * (q[2] * q[4] + q[1] * q[3]) >= 0)::INT + 2 * (2 * (q[3] * q[4]
 """Octant of the approach direction, the third column of the rotation of a wxyz quaternion (geometry.grasp_diversity)."""
 
 
-def _by(name: str, key: str, caption: str) -> Query:
+def _grasp_query(name: str, key: str, caption: str) -> Query:
     """Return the query of grasps by a column: filtered grasps, unfiltered sample, octants, repeated trials, second engine."""
     return Query(
         name,
@@ -49,8 +49,8 @@ ORDER BY objects DESC, c.{key}""",
     )
 
 
-BY_GRIPPER = _by("grasps_by_gripper", "gripper", "Grasps by gripper.")
-BY_CATEGORY = _by("grasps_by_category", "category", "Grasps by category.")
+BY_GRIPPER = _grasp_query("grasps_by_gripper", "gripper", "Grasps by gripper.")
+BY_CATEGORY = _grasp_query("grasps_by_category", "category", "Grasps by category.")
 _TWINS = Query(
     "twins",
     "",

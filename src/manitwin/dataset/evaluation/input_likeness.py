@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.dataset.evaluation.source_picture import Source, best_outline, look, source_of
+from manitwin.dataset.evaluation.source_picture import Source, best_silhouette_iou, image_feature, load_source
 from manitwin.dataset.evaluation.thirty_views import View, thirty_views
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.embedders.clip import ClipFolder
 from manitwin.models.embedders.clip_endpoint import ClipEndpoint
-from manitwin.render.raycast import merged
+from manitwin.render.raycast import merge_parts
 from manitwin.twin.loaded_twin import Twin
 
 ULIP, CLIP_NORMALS, CLIP_COLORS = "ULIP", "CLIP(N-I/T)", "CLIP(I-I/T)"
@@ -30,7 +30,7 @@ class Models:
     clip: ClipFolder | ClipEndpoint | None = None
     ulip: ClipFolder | None = None
 
-    def said(self) -> dict[str, dict[str, Any] | None]:
+    def describe_models(self) -> dict[str, dict[str, Any] | None]:
         """Return the name and file sha256 of each model (no sha256 for a server); None if it was not given."""
         given: dict[str, ClipFolder | ClipEndpoint | None] = {"clip": self.clip, "ulip": self.ulip}
         return {
@@ -63,9 +63,9 @@ def likeness_of_twins(
     The control input is that of a random twin of the same kind whose input has other bytes; None if there is none. ``on_twin`` is
     called for each compared twin. Raises Unavailable without the EfficientNet weights, and RendererMissing without a renderer.
     """
-    made = [(twin, source) for twin in twins if (source := source_of(twin)) is not None]
+    made = [(twin, source) for twin in twins if (source := load_source(twin)) is not None]
     inputs = [_Input.of(source, models) for _, source in made]
-    others = partners([source for _, source in made], np.random.default_rng(seed))
+    others = draw_partners([source for _, source in made], np.random.default_rng(seed))
     found = []
     for place, (twin, source) in enumerate(made):
         other = None if (o := others[place]) is None else (made[o][0].record.twin_id, inputs[o])
@@ -75,7 +75,7 @@ def likeness_of_twins(
     return found
 
 
-def partners(sources: Sequence[Source], rng: np.random.Generator) -> list[int | None]:
+def draw_partners(sources: Sequence[Source], rng: np.random.Generator) -> list[int | None]:
     """Return, for each source, the index of another source of the same kind, chosen about equally often; None if all
     are equal.
     """
@@ -86,11 +86,11 @@ def partners(sources: Sequence[Source], rng: np.random.Generator) -> list[int | 
         )
         for rank, place in enumerate(order):
             following = (int(order[(rank + step) % len(order)]) for step in range(1, len(order)))
-            chosen[int(place)] = next((o for o in following if _differ(sources[o], sources[int(place)])), None)
+            chosen[int(place)] = next((o for o in following if _has_other_input(sources[o], sources[int(place)])), None)
     return chosen
 
 
-def _differ(one: Source, other: Source) -> bool:
+def _has_other_input(one: Source, other: Source) -> bool:
     return one.text != other.text if one.kind == "text" else one.sha256 != other.sha256
 
 
@@ -107,13 +107,13 @@ class _Input:
     def of(cls, source: Source, models: Models) -> _Input:
         if source.left_out:
             return cls(source, None, None, None)
-        vectors = [None if model is None else _embedded(model, source) for model in (models.clip, models.ulip)]
+        vectors = [None if model is None else _embed_source(model, source) for model in (models.clip, models.ulip)]
         if source.rgb is None or source.mask is None:
             return cls(source, None, *vectors)
-        return cls(source, look(source.rgb, source.mask), *vectors)
+        return cls(source, image_feature(source.rgb, source.mask), *vectors)
 
 
-def _embedded(model: ClipFolder | ClipEndpoint, source: Source) -> np.ndarray:
+def _embed_source(model: ClipFolder | ClipEndpoint, source: Source) -> np.ndarray:
     found = model.texts([source.text]) if source.kind == "text" else model.pictures([source.on_white])
     return np.asarray(found[0])
 
@@ -125,21 +125,21 @@ def _likeness(twin: Twin, source: Source, own: _Input, other: tuple[str, _Input]
         return Likeness(*said)
     drawn = source.kind == "image" or models.clip is not None
     views = thirty_views(twin) if drawn else []
-    looks = np.array([look(view.grey, view.coverage) for view in views]) if source.kind == "image" else None
+    looks = np.array([image_feature(view.grey, view.coverage) for view in views]) if source.kind == "image" else None
     vectors = {}
     if models.clip is not None:
         vectors[CLIP_NORMALS] = models.clip.pictures([view.normals for view in views])
         vectors[CLIP_COLORS] = models.clip.pictures([view.rgb for view in views])
     if models.ulip is not None:
-        points, _, _ = sample_surface(merged(twin.visual), models.ulip.point_count, np.random.default_rng(0))
+        points, _, _ = sample_surface(merge_parts(twin.visual), models.ulip.point_count, np.random.default_rng(0))
         vectors[ULIP] = models.ulip.points(points)[None]
-    values, best = _values(own, views, looks, vectors)
-    shuffled = _values(other[1], views, looks, vectors)[0] if other is not None else {}
+    values, best = _similarities(own, views, looks, vectors)
+    shuffled = _similarities(other[1], views, looks, vectors)[0] if other is not None else {}
     picture = _picture(source, views[best]) if source.kind == "image" else None
     return Likeness(*said, values, shuffled, None if other is None else other[0], picture)
 
 
-def _values(
+def _similarities(
     given: _Input, views: Sequence[View], looks: np.ndarray | None, vectors: dict[str, np.ndarray]
 ) -> tuple[dict[str, float], int]:
     """Return the similarity of views to an input by metric, and the index of the view with the most similar silhouette."""
@@ -152,7 +152,7 @@ def _values(
     if looks is not None and given.look is not None and given.source.mask is not None:
         cosines = looks @ given.look
         values |= {LOOK_MEAN: float(cosines.mean()), LOOK_BEST: float(cosines.max())}
-        values[OUTLINE], best = best_outline(given.source.mask, views)
+        values[OUTLINE], best = best_silhouette_iou(given.source.mask, views)
     return values, best
 
 

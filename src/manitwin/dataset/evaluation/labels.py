@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.formats.csv_file import read_csv
 from manitwin.twin.point_records import GraspType
 
@@ -67,7 +67,7 @@ def read_labels(path: Path) -> list[Label]:
     for line, row in read_csv(path, UsageError):
         for name in row:
             if name not in COLUMNS:
-                raise UsageError(f"{path}: {choose_from('column', name, COLUMNS)}")
+                raise UsageError(f"{path}: {unknown_name_message('column', name, COLUMNS)}")
         if len(labels) == MOST_ROWS:
             raise UsageError(f"{path}: more than {MOST_ROWS:,} rows; split the file")
         said = {name: (row.get(name) or "").strip() for name in COLUMNS}
@@ -100,7 +100,7 @@ def _grasp_type(said: str, where: str) -> str:
     """Return a grasp type by its identifier; spellings such as "parallel jaw" are accepted."""
     name = "_".join(said.lower().replace("-", " ").split())
     if name not in GRASP_TYPES:
-        raise UsageError(f"{where}: {choose_from('typical_grasp_type', said, GRASP_TYPES)}")
+        raise UsageError(f"{where}: {unknown_name_message('typical_grasp_type', said, GRASP_TYPES)}")
     return name
 
 

@@ -30,32 +30,32 @@ a spoon and a brush. A top is not on the body, since it may be a cap's, and the 
 
 def words_of(text: str) -> frozenset[str]:
     """Return the set of words of a text, in normalized spelling and singular."""
-    return frozenset(_plain(word) for word in re.findall(r"[a-z]+", text.lower()))
+    return frozenset(_normalize_word(word) for word in re.findall(r"[a-z]+", text.lower()))
 
 
-def matches(name: str, other: str) -> bool:
+def is_same_part(name: str, other: str) -> bool:
     """Return whether two part names are equivalent: all words of one are among those of the other, ignoring plurals."""
     one, two = words_of(name), words_of(other)
     return bool(one and two) and (one <= two or two <= one)
 
 
-def is_one_of(name: str, truth: Iterable[str]) -> bool:
+def matches_any(name: str, truth: Iterable[str]) -> bool:
     """Return whether a part name matches one of the listed names."""
-    return any(matches(name, each) for each in truth)
+    return any(is_same_part(name, each) for each in truth)
 
 
-def is_on_one_of(name: str, truth: Iterable[str]) -> bool:
+def is_on_any(name: str, truth: Iterable[str]) -> bool:
     """Return whether a name denotes a listed part, by itself or a synonym, or a location on one."""
     listed = tuple(truth)
-    return is_one_of(name, listed) or any(_noun(name) in _ON.get(_noun(each), ()) for each in listed)
+    return matches_any(name, listed) or any(_head_noun(name) in _ON.get(_head_noun(each), ()) for each in listed)
 
 
-def _noun(name: str) -> str:
+def _head_noun(name: str) -> str:
     """Return the head noun of a name, singular: the last word before ``of`` and similar prepositions."""
     found = re.findall(r"[a-z]+", re.split(r"\b(?:of|in|for|on)\b", name.lower())[0])
-    return _plain(found[-1]) if found else ""
+    return _normalize_word(found[-1]) if found else ""
 
 
-def _plain(word: str) -> str:
+def _normalize_word(word: str) -> str:
     word = SPELLINGS.get(word, word)
     return word[:-1] if len(word) > 3 and word.endswith("s") and not word.endswith("ss") else word

@@ -7,10 +7,10 @@ from statistics import fmean
 from typing import Any
 
 from manitwin.dataset.evaluation.input_likeness import METRICS, OF_PICTURES, OUTLINE, Likeness
-from manitwin.dataset.evaluation.paper import CLAY, GENERATION_QUALITY, GENERATION_TIME_S
+from manitwin.dataset.evaluation.paper_figures import CLAY, GENERATION_QUALITY, GENERATION_TIME_S
 from manitwin.dataset.report_page import Picture
 from manitwin.formats.image_file import png_of
-from manitwin.twin.shares import wilson_interval
+from manitwin.twin.proportions import wilson_interval
 
 MOST_PICTURES = 28
 _NOT_MEASURED = "not measured: no model was given (--clip, --ulip)"

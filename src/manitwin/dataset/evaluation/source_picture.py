@@ -12,7 +12,7 @@ from manitwin.config import MattingConfig
 from manitwin.dataset.evaluation.thirty_views import SIDE_PX, WHITE, View
 from manitwin.errors import InputError, Rejected
 from manitwin.models.classifiers.efficientnet_lite import features
-from manitwin.models.embedders.looks import MARGIN, NETWORK, centered
+from manitwin.models.embedders.appearance import MARGIN, NETWORK, center_object
 from manitwin.models.matting import matte_photo
 from manitwin.pipeline.photo_pixels import pixels_of_photo
 from manitwin.pipeline.stated_place import as_box
@@ -55,7 +55,7 @@ class Source:
         return np.rint(np.clip(shown, 0, 255)).astype(np.uint8)
 
 
-def source_of(twin: Twin) -> Source | None:
+def load_source(twin: Twin) -> Source | None:
     """Return the input that a twin was generated from; None for a mesh, from which nothing is generated.
 
     A photo is segmented again with the default settings of a build.
@@ -82,13 +82,13 @@ def source_of(twin: Twin) -> Source | None:
     return Source("image", source.sha256, rgb=rgba[..., :3], mask=rgba[..., 3].astype(np.float32) / 255)
 
 
-def look(rgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
+def image_feature(rgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """Return the unit vector ``(1280,)`` of EfficientNet-Lite0 features of an object on grey; raises Unavailable."""
-    vector = features(centered(rgb, mask)[0][None])[0, -NETWORK:].astype(np.float64)
+    vector = features(center_object(rgb, mask)[0][None])[0, -NETWORK:].astype(np.float64)
     return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-9))
 
 
-def outline(mask: np.ndarray, turn_rad: float = 0.0) -> np.ndarray:
+def normalize_silhouette(mask: np.ndarray, turn_rad: float = 0.0) -> np.ndarray:
     """Return the silhouette ``(96, 96) bool`` of a mask ``(H, W)`` in 0..1, centred, scaled to a fixed area, and rotated."""
     inside = (mask > 0.5).astype(np.float32)
     area = float(inside.sum())
@@ -102,10 +102,12 @@ def outline(mask: np.ndarray, turn_rad: float = 0.0) -> np.ndarray:
     return np.asarray(cv2.warpAffine(inside, np.column_stack([linear, middle]), (OUTLINE_PX, OUTLINE_PX)) > 0.5)
 
 
-def best_outline(mask: np.ndarray, views: Sequence[View]) -> tuple[float, int]:
+def best_silhouette_iou(mask: np.ndarray, views: Sequence[View]) -> tuple[float, int]:
     """Return the largest silhouette IoU of a mask with the views over all rotations, and the index of the best view."""
-    turned = np.array([outline(mask, 2 * np.pi * turn / TURNS).ravel() for turn in range(TURNS)], np.float32)
-    seen = np.array([outline(view.coverage).ravel() for view in views], np.float32)
+    turned = np.array(
+        [normalize_silhouette(mask, 2 * np.pi * turn / TURNS).ravel() for turn in range(TURNS)], np.float32
+    )
+    seen = np.array([normalize_silhouette(view.coverage).ravel() for view in views], np.float32)
     both = turned @ seen.T
     shares = both / (turned.sum(1)[:, None] + seen.sum(1)[None] - both)
     best = shares.max(0)

@@ -77,7 +77,7 @@ class EvaluationReport:
         for table in self.tables:
             if table.printed and table.rows:
                 shown = [{name: row[name] for name in row if name != WHY} for row in table.rows[:_MOST_PRINTED]]
-                lines += ["", table.caption, *_aligned(shown)]
+                lines += ["", table.caption, *_align_columns(shown)]
                 lines += [f"  {row['metric']} ({row['comparable']}): {row[WHY]}" for row in table.rows if WHY in row]
                 if len(table.rows) > _MOST_PRINTED:
                     lines.append(f"... and {len(table.rows) - _MOST_PRINTED} more: use --out or --json for all")
@@ -93,7 +93,7 @@ def write_evaluation(out: Path, report: EvaluationReport) -> None:
         Table(
             " ".join(each for each in (table.caption, table.note) if each),
             [_heading(name) for name in table.rows[0]],
-            [[_shown(name, value) for name, value in row.items()] for row in table.rows],
+            [[_display_value(name, value) for name, value in row.items()] for row in table.rows],
         )
         for table in report.tables
         if table.rows
@@ -118,7 +118,7 @@ def _csv(rows: Sequence[Row]) -> str:
     return stream.getvalue()
 
 
-def _aligned(rows: Sequence[Row]) -> list[str]:
+def _align_columns(rows: Sequence[Row]) -> list[str]:
     texts = [[_heading(name) for name in rows[0]], *([_text(name, row[name]) for name in row] for row in rows)]
     widths = [max(len(row[place]) for row in texts) for place in range(len(texts[0]))]
     return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in texts]
@@ -128,7 +128,7 @@ def _heading(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _shown(name: str, value: Any) -> str | int | float | None:
+def _display_value(name: str, value: Any) -> str | int | float | None:
     if value is None and name == MEASURED:
         return NOT_MEASURED
     return value if value is None or isinstance(value, str | int | float) else str(value)

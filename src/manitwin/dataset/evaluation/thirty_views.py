@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.models.embedders.looks import GREY
+from manitwin.models.embedders.appearance import GREY
 from manitwin.render.cameras import Camera, framing_camera
-from manitwin.render.raycast import cast_camera, merged
+from manitwin.render.raycast import cast_camera, merge_parts
 from manitwin.render.renderer import shared_renderer
 from manitwin.twin.loaded_twin import Twin
 
@@ -52,11 +52,11 @@ def cameras(points_m: np.ndarray) -> list[Camera]:
 def thirty_views(twin: Twin) -> list[View]:
     """Render a twin's surface from 30 sides; raises RendererMissing without a renderer."""
     around = cameras(np.concatenate([part.vertices for part in twin.visual]))
-    caster = RayCaster(merged(twin.visual))
+    caster = RayCaster(merge_parts(twin.visual))
     grey, white = (GREY,) * 3, (WHITE,) * 3
     frames = shared_renderer().render(twin.visual, around, background=grey)
     return [
-        View(frame.over(grey, white), frame.rgb, normal_picture(caster, camera), frame.coverage)
+        View(frame.composited_over(grey, white), frame.rgb, normal_picture(caster, camera), frame.coverage)
         for frame, camera in zip(frames, around, strict=True)
     ]
 

@@ -13,7 +13,7 @@ from manitwin.dataset.index.conditions import sql_texts
 from manitwin.dataset.index.query import Index, grasps_of
 from manitwin.dataset.index.rows import VISUAL
 from manitwin.dataset.index.twins import local_files
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.geometry.sampling import sample_surface
 from manitwin.twin.shape_file import surface
@@ -57,7 +57,7 @@ def batches(
         found = _grasps(index, some, verified_only)
         rngs = [_rng(seed, twin_id) for twin_id in ids]
         clouds = [_cloud(index, twin_id, points, rng) for twin_id, rng in zip(ids, rngs, strict=True)]
-        drawn = [_drawn(*found[twin_id], grasps, rng) for twin_id, rng in zip(ids, rngs, strict=True)]
+        drawn = [_draw_grasps(*found[twin_id], grasps, rng) for twin_id, rng in zip(ids, rngs, strict=True)]
         poses, mask, verified = (np.stack(each) for each in zip(*drawn, strict=True))
         arrays = {"points": np.stack(clouds), "grasps": poses, "mask": mask, "verified": verified}
         return {**{name: convert(array) for name, array in arrays.items()}, "twin_ids": ids}
@@ -69,7 +69,7 @@ def _converter(framework: str) -> Callable[[np.ndarray], Any]:
     if framework == "numpy":
         return lambda array: array
     if framework != "torch":
-        raise UsageError(choose_from("framework", framework, ("numpy", "torch")))
+        raise UsageError(unknown_name_message("framework", framework, ("numpy", "torch")))
     try:
         from torch import from_numpy
     except ImportError as error:
@@ -110,7 +110,7 @@ def _grasps(index: Index, twins: pa.Table, verified_only: bool) -> dict[str, tup
     return {twin_id: (poses[which], verified[which]) for twin_id, which in own.items()}
 
 
-def _drawn(
+def _draw_grasps(
     poses: np.ndarray, verified: np.ndarray, count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return up to ``count`` grasps padded with the identity to ``(count, 4, 4)``, the mask of real grasps, and the verdicts."""

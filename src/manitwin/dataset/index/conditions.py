@@ -9,7 +9,7 @@ from typing import Any
 import duckdb
 
 from manitwin.dataset.index.tables import TABLES
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 
 _CONDITION_CHARACTERS = 100_000
 """Maximum length of a condition. Conditions written by this package list up to a thousand twin ids of 20 characters each."""
@@ -89,7 +89,9 @@ def _check_nodes(node: Any, condition: str) -> None:
         if node.get("type") == "BASE_TABLE":
             path = [node[part] for part in ("catalog_name", "schema_name", "table_name") if node[part]]
             if len(path) != 1 or path[0].lower() not in TABLES:
-                raise UsageError(f"condition {_short(condition)}: {choose_from('table', '.'.join(path), TABLES)}")
+                raise UsageError(
+                    f"condition {_short(condition)}: {unknown_name_message('table', '.'.join(path), TABLES)}"
+                )
         for value in node.values():
             _check_nodes(value, condition)
 

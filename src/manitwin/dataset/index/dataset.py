@@ -54,7 +54,7 @@ class Dataset(Sequence["Twin"]):
         self._sorted: tuple[PartList, Twins] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (self._index, self._where)
+        return _unpickle, (self._index, self._where)
 
     @property
     def root(self) -> DatasetRoot:
@@ -122,9 +122,11 @@ class Dataset(Sequence["Twin"]):
         All rows of ``grasps.parquet`` are included: failed grasps, other grippers' grasps, the unfiltered sample (``proposer``
         ends in ``:unfiltered``) and the jittered controls (``:jittered``).
         """
-        return self._index.select("grasps", [*self._owned(), *([] if where is None else [where])], columns=columns)
+        return self._index.select(
+            "grasps", [*self._grasp_conditions(), *([] if where is None else [where])], columns=columns
+        )
 
-    def _owned(self) -> list[str]:
+    def _grasp_conditions(self) -> list[str]:
         """Return the conditions on ``grasps`` that select these twins: their ids if they are few, else a subquery."""
         if not self._where:
             return []
@@ -178,7 +180,7 @@ class Dataset(Sequence["Twin"]):
         )
 
 
-def _restored(index: Index, where: tuple[str, ...]) -> Dataset:
+def _unpickle(index: Index, where: tuple[str, ...]) -> Dataset:
     return Dataset(index.root, _index=index, _where=where)
 
 

@@ -68,7 +68,7 @@ def near_duplicates(
         .reshape(-1, DESCRIPTOR_LENGTH)
     )
     log_sizes = np.log(rows["radius_of_gyration_m"].to_numpy())
-    first, second, distance, ratio = _near(shapes, log_sizes, max_shape_distance, np.log(max_size_ratio))
+    first, second, distance, ratio = _near_pairs(shapes, log_sizes, max_shape_distance, np.log(max_size_ratio))
     pairs = [
         NearPair(ids[a], ids[b], float(d), float(r)) for a, b, d, r in zip(first, second, distance, ratio, strict=True)
     ]
@@ -76,7 +76,7 @@ def near_duplicates(
     return NearDuplicates(shared, pairs)
 
 
-def _near(
+def _near_pairs(
     shapes: np.ndarray, log_sizes: np.ndarray, max_distance: float, max_log_ratio: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the index pairs within both limits, their distances and size ratios, nearest first.

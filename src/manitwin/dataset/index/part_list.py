@@ -68,9 +68,9 @@ def read_part_list(root: DatasetRoot) -> PartList | None:
 
     Raises UsageError if the index is unreadable or has the tables of another version.
     """
-    remedy = remedy_of(root)
+    remedy = repair_command(root)
     try:
-        data = root.read_json(PARTS, refusal_of(root))
+        data = root.read_json(PARTS, error_factory(root))
     except FileNotFoundError:
         return None
     try:
@@ -102,14 +102,14 @@ def no_dataset(root: DatasetRoot) -> UsageError:
     )
 
 
-def remedy_of(root: DatasetRoot) -> str:
+def repair_command(root: DatasetRoot) -> str:
     """Return the command that repairs a damaged index."""
     return f"run manitwin check {root.url}"
 
 
-def refusal_of(root: DatasetRoot) -> Refusal:
+def error_factory(root: DatasetRoot) -> Refusal:
     """Return a factory of errors for malformed files whose own remedy is replaced by that of the index."""
-    return with_remedy(UsageError, remedy_of(root))
+    return with_remedy(UsageError, repair_command(root))
 
 
 def require_files(root: DatasetRoot, parts: PartList) -> None:
@@ -121,10 +121,15 @@ def require_files(root: DatasetRoot, parts: PartList) -> None:
             path = Path(root.full(part.file(table)))
             if part.rows[table] or os.path.lexists(path):
                 rows = check_parquet(
-                    path, refusal_of(root), schema=schema, remedy=remedy_of(root), inside=root.local, max_rows=MAX_ROWS
+                    path,
+                    error_factory(root),
+                    schema=schema,
+                    remedy=repair_command(root),
+                    inside=root.local,
+                    max_rows=MAX_ROWS,
                 )
                 if rows != part.rows[table]:
-                    raise UsageError(f"{path}: {rows} rows, {PARTS} says {part.rows[table]}; {remedy_of(root)}")
+                    raise UsageError(f"{path}: {rows} rows, {PARTS} says {part.rows[table]}; {repair_command(root)}")
 
 
 def require_regular(root: DatasetRoot, parts: PartList) -> None:
@@ -133,7 +138,7 @@ def require_regular(root: DatasetRoot, parts: PartList) -> None:
         for table in TABLES:
             path = Path(root.full(part.file(table)))
             if os.path.lexists(path):
-                open_regular(path, refusal_of(root), inside=root.local, name=str(path)).close()
+                open_regular(path, error_factory(root), inside=root.local, name=str(path)).close()
 
 
 def _part(said: Any) -> IndexPart:
@@ -152,12 +157,12 @@ def _count(said: Any) -> int:
     return said
 
 
-def in_order_of_twins(parts: Iterable[IndexPart]) -> tuple[IndexPart, ...]:
+def sort_parts(parts: Iterable[IndexPart]) -> tuple[IndexPart, ...]:
     """Return parts in the order of the list."""
     return tuple(sorted(parts, key=lambda part: (part.first, part.last, part.name)))
 
 
-def sweep(root: DatasetRoot, keep: PartList) -> list[str]:
+def remove_unused_files(root: DatasetRoot, keep: PartList) -> list[str]:
     """Remove index files that belong to no part (left by a crash, or replaced) and return their names."""
     wanted = {PARTS, *(part.file(table) for part in keep.parts for table in TABLES)}
     stale = [name for name in root.names_below(INDEX) if name not in wanted]

@@ -23,13 +23,13 @@ from manitwin.dataset.index.part_list import (
     INDEX,
     IndexPart,
     PartList,
-    in_order_of_twins,
     read_part_list,
+    remove_unused_files,
     require_files,
-    sweep,
+    sort_parts,
 )
 from manitwin.dataset.index.rows import FILES, rows_of
-from manitwin.dataset.index.tables import TABLES, joined, parquet
+from manitwin.dataset.index.tables import TABLES, concatenate_tables, parquet
 from manitwin.dataset.index.twins import local_files
 from manitwin.errors import UsageError
 from manitwin.formats.printable import printable_line
@@ -86,15 +86,15 @@ def write_part(root: DatasetRoot, ids: Iterable[str], *, gone: Iterable[str] = (
     wanted = sorted(set(ids))
     changed = sorted({*wanted, *gone})
     before = read_part_list(root) or PartList()
-    sweep(root, before)
+    remove_unused_files(root, before)
     if not changed:
         return None
     writer = _Writer(root, before)
     older = writer.parts_with(changed)
-    part = writer.add(_joined(rows_of_twins(root, wanted))) if wanted else None
+    part = writer.add(_concatenate_rows(rows_of_twins(root, wanted))) if wanted else None
     for each in older:
         writer.replace([each], without=frozenset(changed))
-    while alike := _alike(writer.parts):
+    while alike := _mergeable_parts(writer.parts):
         writer.replace(alike)
     writer.finish()
     return part
@@ -103,13 +103,13 @@ def write_part(root: DatasetRoot, ids: Iterable[str], *, gone: Iterable[str] = (
 def compact(root: DatasetRoot) -> list[IndexPart]:
     """Merge all parts into a few large ones that do not overlap and return them; a compact index stays unchanged."""
     before = read_part_list(root) or PartList()
-    sweep(root, before)
+    remove_unused_files(root, before)
     if _is_compact(before):
         return list(before.parts)
     writer = _Writer(root, before)
     writer.replace(list(before.parts))
     after = writer.finish()
-    sweep(root, after)
+    remove_unused_files(root, after)
     return list(after.parts)
 
 
@@ -132,9 +132,9 @@ def rows_of_twins(root: DatasetRoot, ids: Iterable[str]) -> Iterator[dict[str, p
             yield rows_of(folder)
 
 
-def _joined(rows: Iterator[dict[str, pa.Table]]) -> dict[str, pa.Table]:
+def _concatenate_rows(rows: Iterator[dict[str, pa.Table]]) -> dict[str, pa.Table]:
     each = list(rows)
-    return {table: joined(table, [tables[table] for tables in each]) for table in TABLES}
+    return {table: concatenate_tables(table, [tables[table] for tables in each]) for table in TABLES}
 
 
 def _is_compact(parts: PartList) -> bool:
@@ -144,7 +144,7 @@ def _is_compact(parts: PartList) -> bool:
     return apart and len(ordered) <= max(1, -(-parts.rows("grasps") // PART_ROWS))
 
 
-def _alike(parts: Sequence[IndexPart]) -> list[IndexPart]:
+def _mergeable_parts(parts: Sequence[IndexPart]) -> list[IndexPart]:
     """Return parts of similar size if there are enough of them to merge; full parts are left alone."""
     by_size: dict[int, list[IndexPart]] = {}
     for part in parts:
@@ -177,13 +177,13 @@ class _Writer:
     def replace(self, parts: list[IndexPart], without: frozenset[str] = frozenset()) -> None:
         """Rewrite the rows of parts, merged, without the rows of some twins."""
         grasps = sum(part.rows["grasps"] for part in parts)
-        for rows in merged(files_of(self.root, parts), self.fs, grasps, without=without):
+        for rows in merge_rows(files_of(self.root, parts), self.fs, grasps, without=without):
             self.add(rows)
         self.parts = [part for part in self.parts if part not in parts]
 
     def finish(self) -> PartList:
         """Make these parts the index."""
-        after = PartList(in_order_of_twins(self.parts), self.next)
+        after = PartList(sort_parts(self.parts), self.next)
         after.write(self.root)
         return after
 
@@ -216,7 +216,7 @@ def twin_ids(files: Files, fs: Any) -> np.ndarray:
     return np.sort(np.concatenate([column.to_numpy(zero_copy_only=False).astype(str) for column in both]))
 
 
-def merged(
+def merge_rows(
     files: Files, fs: Any, grasps: int, *, without: frozenset[str] = frozenset()
 ) -> Iterator[dict[str, pa.Table]]:
     """Yield the rows of all files, except those of the twins ``without``, by table, in id ranges that do not overlap.
@@ -232,7 +232,7 @@ def merged(
         within = (pc.field("twin_id") >= str(chunk[0])) & (pc.field("twin_id") <= str(chunk[-1]))
         if without:
             within &= ~pc.field("twin_id").isin(sorted(without))
-        yield {table: joined(table, [read_rows(files, table, fs, where=within)]) for table in TABLES}
+        yield {table: concatenate_tables(table, [read_rows(files, table, fs, where=within)]) for table in TABLES}
 
 
 def write_rows(root: DatasetRoot, number: int, rows: Mapping[str, pa.Table]) -> IndexPart:

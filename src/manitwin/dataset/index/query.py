@@ -18,12 +18,12 @@ from manitwin.dataset.index.part_list import (
     PartList,
     no_index,
     read_part_list,
-    remedy_of,
+    repair_command,
     require_files,
     require_regular,
 )
 from manitwin.dataset.index.tables import ORDER, TABLES
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.twin.dataset_root import DatasetRoot
 
 _Answer = TypeVar("_Answer")
@@ -67,12 +67,12 @@ class Index:
     @property
     def parts(self) -> PartList:
         """The parts that are read."""
-        return self._opened()[0]
+        return self._open_connection()[0]
 
     @property
     def connection(self) -> duckdb.DuckDBPyConnection:
         """A DuckDB connection with one view per table for custom SQL; it can read the index and nothing else."""
-        return self._opened()[1]
+        return self._open_connection()[1]
 
     def select(
         self,
@@ -89,13 +89,13 @@ class Index:
             raise UsageError(f"no columns given; choose from {', '.join(schema.names)}")
         for name in names:
             if name not in schema.names:
-                raise UsageError(choose_from(f"column of {table}", name, schema.names))
+                raise UsageError(unknown_name_message(f"column of {table}", name, schema.names))
         if limit is not None and limit < 0:
             raise UsageError(f"limit is {limit}; give 0 or more")
         chosen, order = ", ".join(f'"{name}"' for name in names), ", ".join(ORDER[table])
         ending = f"ORDER BY {order}" + ("" if limit is None else f" LIMIT {limit}")
         sql = f"SELECT {chosen} FROM {table} {self.where(where)} {ending}"
-        rows = self._ask(table, lambda connection: connection.sql(sql).to_arrow_table())
+        rows = self._run_query(table, lambda connection: connection.sql(sql).to_arrow_table())
         try:
             return rows.cast(pa.schema([schema.field(name) for name in names]))
         except pa.ArrowException as error:
@@ -105,7 +105,7 @@ class Index:
         """Return the number of rows that satisfy all conditions."""
         _schema(table)
         sql = f"SELECT count(*) FROM {table} {self.where(where)}"
-        return int(self._ask(table, lambda connection: connection.sql(sql).fetchall())[0][0])
+        return int(self._run_query(table, lambda connection: connection.sql(sql).fetchall())[0][0])
 
     def where(self, where: Sequence[str] | str) -> str:
         """Return the WHERE clause of all conditions after checking each; raises UsageError."""
@@ -115,17 +115,17 @@ class Index:
         # On its own line: a comment at the end of a condition must not swallow the bracket.
         return "WHERE " + " AND ".join(f"(\n{condition}\n)" for condition in conditions) if conditions else ""
 
-    def _ask(self, table: str, question: Callable[[duckdb.DuckDBPyConnection], _Answer]) -> _Answer:
+    def _run_query(self, table: str, question: Callable[[duckdb.DuckDBPyConnection], _Answer]) -> _Answer:
         try:
-            return self._limited(table, question)
+            return self._run_limited(table, question)
         except _FILE_IS_GONE:
             self._open = None  # a merge has replaced the files; the new list names the new ones
         try:
-            return self._limited(table, question)
+            return self._run_limited(table, question)
         except _FILE_IS_GONE as error:
             raise self._damaged(error) from error
 
-    def _limited(self, table: str, question: Callable[[duckdb.DuckDBPyConnection], _Answer]) -> _Answer:
+    def _run_limited(self, table: str, question: Callable[[duckdb.DuckDBPyConnection], _Answer]) -> _Answer:
         """Run a query within the limits of time and memory; a signal interrupts it as well."""
         connection = self.connection
         timer = threading.Timer(self.timeout_s, connection.interrupt)
@@ -150,7 +150,7 @@ class Index:
             self._open = None
             if not isinstance(error, _OF_THE_CONDITION):
                 require_files(self.root, read_part_list(self.root) or PartList())
-            raise UsageError(_explained(error, table)) from error
+            raise UsageError(_explain_error(error, table)) from error
         except UnicodeDecodeError as error:  # undecodable names from a damaged file in DuckDB's message
             raise self._damaged(error) from error
         except RuntimeError as error:
@@ -161,7 +161,7 @@ class Index:
             timer.cancel()
             timer.join()  # a thread that outlives the program would hold the connection, and DuckDB's binding reports a leak
 
-    def _opened(self) -> tuple[PartList, duckdb.DuckDBPyConnection]:
+    def _open_connection(self) -> tuple[PartList, duckdb.DuckDBPyConnection]:
         if self._open is None:
             parts = read_part_list(self.root)
             if parts is None:
@@ -176,7 +176,9 @@ class Index:
         return self._open
 
     def _damaged(self, error: Exception) -> UsageError:
-        return UsageError(f"the index of {self.root.url} cannot be read ({_first_line(error)}); {remedy_of(self.root)}")
+        return UsageError(
+            f"the index of {self.root.url} cannot be read ({_first_line(error)}); {repair_command(self.root)}"
+        )
 
 
 def _connect(root: DatasetRoot, parts: PartList, memory_gb: float) -> duckdb.DuckDBPyConnection:
@@ -221,16 +223,16 @@ def grasps_of(twins: pa.Table) -> list[str]:
 
 def _schema(table: str) -> pa.Schema:
     if table not in TABLES:
-        raise UsageError(choose_from("table", table, TABLES))
+        raise UsageError(unknown_name_message("table", table, TABLES))
     return TABLES[table]
 
 
-def _explained(error: duckdb.Error, table: str) -> str:
+def _explain_error(error: duckdb.Error, table: str) -> str:
     """Describe an invalid condition in one line; for an unknown column, name the nearest and all valid ones."""
     unknown = re.search(r'Referenced column "(.+?)" not found', str(error))
     if unknown:
         name = unknown.group(1)
-        return f"{choose_from(f'column of {table}', name, TABLES[table].names)} (a text is written {sql_texts([name])})"
+        return f"{unknown_name_message(f'column of {table}', name, TABLES[table].names)} (a text is written {sql_texts([name])})"
     return f"condition on {table}: {_first_line(error)}"
 
 

@@ -10,9 +10,9 @@ from pathlib import Path, PurePosixPath
 from pebble import ProcessExpired
 from pyarrow.fs import LocalFileSystem
 
-from manitwin.dataset.index.part_list import INDEX, IndexPart, PartList, in_order_of_twins, no_dataset, sweep
-from manitwin.dataset.index.parts import merged, rows_of_twins, write_rows
-from manitwin.dataset.index.tables import TABLES, joined, parquet
+from manitwin.dataset.index.part_list import INDEX, IndexPart, PartList, no_dataset, remove_unused_files, sort_parts
+from manitwin.dataset.index.parts import merge_rows, rows_of_twins, write_rows
+from manitwin.dataset.index.tables import TABLES, concatenate_tables, parquet
 from manitwin.engine.worker_pool import WorkerPool
 from manitwin.engine.worker_processes import hidden_main_module
 from manitwin.errors import TwinError
@@ -35,7 +35,7 @@ class Rebuilt:
 
 
 @dataclass(frozen=True)
-class _Read:
+class _ReadResult:
     """Result of a task; its rows are in files."""
 
     twins: int
@@ -70,11 +70,11 @@ def rebuild(
             grasps += read.grasps
             on_read(read.twins)
         files = {table: sorted(map(str, Path(scratch).glob(f"{table}-*.parquet"))) for table in TABLES}
-        for rows in merged(files, LocalFileSystem(), grasps) if files["twins"] else ():
+        for rows in merge_rows(files, LocalFileSystem(), grasps) if files["twins"] else ():
             parts.append(write_rows(root, number + len(parts), rows))
-    after = PartList(in_order_of_twins(parts), number + len(parts))
+    after = PartList(sort_parts(parts), number + len(parts))
     after.write(root)
-    sweep(root, after)
+    remove_unused_files(root, after)
     return Rebuilt(parts, sorted(unreadable))
 
 
@@ -84,7 +84,7 @@ def _first_unused_number(root: DatasetRoot) -> int:
     return max((int(stem) + 1 for stem in stems if stem.isdecimal()), default=0)
 
 
-def _read_all(root: DatasetRoot, chunks: list[list[str]], scratch: Path, jobs: int) -> Iterator[_Read]:
+def _read_all(root: DatasetRoot, chunks: list[list[str]], scratch: Path, jobs: int) -> Iterator[_ReadResult]:
     pool = WorkerPool(jobs)
     try:
         futures = [pool.schedule(_read, (root, chunk, scratch, number)) for number, chunk in enumerate(chunks)]
@@ -100,7 +100,7 @@ def _read_all(root: DatasetRoot, chunks: list[list[str]], scratch: Path, jobs: i
         pool.stop()
 
 
-def _read(root: DatasetRoot, ids: list[str], scratch: Path, number: int) -> _Read:
+def _read(root: DatasetRoot, ids: list[str], scratch: Path, number: int) -> _ReadResult:
     """Write the rows of twins to files in the scratch folder; runs in a worker process."""
     each = []
     unreadable = []
@@ -111,6 +111,6 @@ def _read(root: DatasetRoot, ids: list[str], scratch: Path, number: int) -> _Rea
             unreadable.append(str(error))
     grasps = sum(len(rows["grasps"]) for rows in each)
     for table in TABLES:
-        content = parquet(joined(table, [rows[table] for rows in each]))
+        content = parquet(concatenate_tables(table, [rows[table] for rows in each]))
         (scratch / f"{table}-{number:06d}.parquet").write_bytes(content)
-    return _Read(len(ids), grasps, unreadable)
+    return _ReadResult(len(ids), grasps, unreadable)

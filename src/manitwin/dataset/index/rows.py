@@ -20,7 +20,7 @@ from manitwin.twin.grasp_summary import GraspSummary
 from manitwin.twin.grasp_table import read_grasp_table
 from manitwin.twin.point_records import Points
 from manitwin.twin.record import TwinRecord
-from manitwin.twin.shape_file import SHAPE, read_shape, shape_of
+from manitwin.twin.shape_file import SHAPE, compute_shape, read_shape
 from manitwin.twin.store import RECORD, REMEDY, RUN, read_record
 
 VISUAL, GRASPS = "visual.glb", "grasps.parquet"
@@ -44,7 +44,7 @@ def rows_of(folder: Path) -> dict[str, pa.Table]:
     if record.rejection is not None:
         rows["rejections"] = [{**_origin(record, costs), **record.rejection.model_dump()}]
         return _as_tables(rows)
-    rows["twins"] = [_twin(record, costs, read_shape(folder) or shape_of(folder / VISUAL))]
+    rows["twins"] = [_twin(record, costs, read_shape(folder) or compute_shape(folder / VISUAL))]
     rows["points"] = [] if record.points is None else _points(record.twin_id, record.points)
     rows["placements"] = _placements(record)
     tables = _as_tables(rows)

@@ -22,12 +22,12 @@ def _schema(**columns: pa.DataType) -> pa.Schema:
     return pa.schema(list(columns.items()))
 
 
-def _named(kind: pa.DataType, names: str) -> dict[str, pa.DataType]:
+def _columns_of_type(kind: pa.DataType, names: str) -> dict[str, pa.DataType]:
     return dict.fromkeys(names.split(), kind)
 
 
-_COST = _named(_REAL, "seconds cpu_seconds cost_usd")
-_ORIGIN = _named(_TEXT, "twin_id revision name kind source_sha256 license")
+_COST = _columns_of_type(_REAL, "seconds cpu_seconds cost_usd")
+_ORIGIN = _columns_of_type(_TEXT, "twin_id revision name kind source_sha256 license")
 
 DESCRIPTOR_LENGTH = 66
 """Length of ``geometry.shape_descriptor``."""
@@ -35,23 +35,23 @@ DESCRIPTOR_LENGTH = 66
 TABLES: dict[str, pa.Schema] = {
     "twins": _schema(
         **_ORIGIN,
-        **_named(_TEXT, "attribution category color material size shape function caption"),
+        **_columns_of_type(_TEXT, "attribution category color material size shape function caption"),
         physical_material=_TEXT,
-        **_named(_REAL, "mass_kg mass_low_kg mass_high_kg"),
+        **_columns_of_type(_REAL, "mass_kg mass_low_kg mass_high_kg"),
         mass_source=_TEXT,
-        **_named(_REAL, "friction_static friction_dynamic density_kg_m3"),
-        **_named(_REAL, "extent_x_m extent_y_m extent_z_m longest_m radius_of_gyration_m volume_m3 area_m2"),
+        **_columns_of_type(_REAL, "friction_static friction_dynamic density_kg_m3"),
+        **_columns_of_type(_REAL, "extent_x_m extent_y_m extent_z_m longest_m radius_of_gyration_m volume_m3 area_m2"),
         watertight=_FLAG,
         hulls=_COUNT,
         keeps_opening=_FLAG,
         gripper=_TEXT,
-        **_named(_COUNT, "proposed simulated verified"),
+        **_columns_of_type(_COUNT, "proposed simulated verified"),
         success_rate=_REAL,
         unfiltered_simulated=_COUNT,
         unfiltered_success_rate=_REAL,
-        **_named(_COUNT, "approach_octants robust"),
-        **_named(_REAL, "robustness_median held_in_second_engine_share kappa"),
-        **_named(_COUNT, "functional_points grasp_points placements"),
+        **_columns_of_type(_COUNT, "approach_octants robust"),
+        **_columns_of_type(_REAL, "robustness_median held_in_second_engine_share kappa"),
+        **_columns_of_type(_COUNT, "functional_points grasp_points placements"),
         upright_probability=_REAL,
         failed_checks=pa.list_(_TEXT),
         seed=pa.int64(),
@@ -60,45 +60,48 @@ TABLES: dict[str, pa.Schema] = {
         shape_descriptor=pa.list_(pa.float32(), DESCRIPTOR_LENGTH),
     ),
     "points": _schema(
-        **_named(_TEXT, "twin_id point_id role"),
+        **_columns_of_type(_TEXT, "twin_id point_id role"),
         candidate=_COUNT,
-        **_named(_REAL, "x_m y_m z_m normal_x normal_y normal_z"),
-        **_named(_TEXT, "label description type scenario"),
+        **_columns_of_type(_REAL, "x_m y_m z_m normal_x normal_y normal_z"),
+        **_columns_of_type(_TEXT, "label description type scenario"),
         confidence=_REAL,
     ),
     "grasps": _schema(
-        **_named(_TEXT, "twin_id category"),
+        **_columns_of_type(_TEXT, "twin_id category"),
         number=_COUNT,
         # From here on the columns are those of a twin's grasps.parquet.
-        **_named(_TEXT, "grasp_id gripper"),
+        **_columns_of_type(_TEXT, "grasp_id gripper"),
         position_m=pa.list_(_REAL, 3),
         quaternion_wxyz=pa.list_(_REAL, 4),
-        **_named(_REAL, "width_m depth_m score"),
-        **_named(_TEXT, "proposer grasp_point_id functional_point_id part_id"),
+        **_columns_of_type(_REAL, "width_m depth_m score"),
+        **_columns_of_type(_TEXT, "proposer grasp_point_id functional_point_id part_id"),
         distance_to_point_m=_REAL,
         outcome=_TEXT,
         verified=_FLAG,
-        **_named(_REAL, "displacement_m rotation_rad"),
+        **_columns_of_type(_REAL, "displacement_m rotation_rad"),
         holds_in_second_engine=_FLAG,
         robustness=_REAL,
         robustness_trials=_COUNT,
         retired=_FLAG,
-        **_named(pa.list_(_REAL), "pregrasp_joints_rad grasp_joints_rad"),
+        **_columns_of_type(pa.list_(_REAL), "pregrasp_joints_rad grasp_joints_rad"),
     ),
     "placements": _schema(
         twin_id=_TEXT,
         number=_COUNT,
-        **_named(_REAL, "x_m y_m z_m"),
+        **_columns_of_type(_REAL, "x_m y_m z_m"),
         quaternion_wxyz=pa.list_(_REAL, 4),
         probability=_REAL,
-        **_named(_FLAG, "upright settled"),
+        **_columns_of_type(_FLAG, "upright settled"),
         collision_radius_m=_REAL,
     ),
     "rejections": _schema(
-        **_ORIGIN, **_named(_TEXT, "stage reason detail"), **_COST, config_sha256=_TEXT, seed=pa.int64()
+        **_ORIGIN, **_columns_of_type(_TEXT, "stage reason detail"), **_COST, config_sha256=_TEXT, seed=pa.int64()
     ),
     "stages": _schema(
-        **_named(_TEXT, "twin_id status"), position=_COUNT, **_named(_TEXT, "stage version backend model"), **_COST
+        **_columns_of_type(_TEXT, "twin_id status"),
+        position=_COUNT,
+        **_columns_of_type(_TEXT, "stage version backend model"),
+        **_COST,
     ),
 }
 
@@ -143,7 +146,7 @@ def parquet(table: pa.Table) -> bytes:
     return stream.getvalue()
 
 
-def joined(name: str, tables: list[pa.Table]) -> pa.Table:
+def concatenate_tables(name: str, tables: list[pa.Table]) -> pa.Table:
     """Return the concatenated rows of one table in file order."""
     rows = pa.concat_tables([TABLES[name].empty_table(), *tables])
     return rows.sort_by([(column, "ascending") for column in _IN_FILES[name]]).combine_chunks()

@@ -30,10 +30,10 @@ def total_lines(twins: Rows) -> list[str]:
     totals = [
         ["twins", f"{len(twins):,}"],
         ["categories", f"{len({twin['category'] for twin in twins}):,}"],
-        ["made of", _counted(twin["kind"] for twin in twins)],
+        ["made of", _count_words(twin["kind"] for twin in twins)],
         ["grasps tried in physics", f"{simulated:,}"],
         ["grasps verified", f"{verified:,}{_share(verified, simulated)}"],
-        ["gripper", _counted(str(twin["gripper"]) for twin in twins)],
+        ["gripper", _count_words(str(twin["gripper"]) for twin in twins)],
         ["held in a second engine too, mean over twins", _mean_share(opinions)],
         ["functional points", f"{sum(twin['functional_points'] for twin in twins):,}"],
         ["grasp points", f"{sum(twin['grasp_points'] for twin in twins):,}"],
@@ -41,14 +41,14 @@ def total_lines(twins: Rows) -> list[str]:
         ["watertight", f"{sum(twin['watertight'] for twin in twins):,}"],
         ["with a failed quality check", f"{sum(bool(twin['failed_checks']) for twin in twins):,}"],
         # Only the part before the colon counts: prior:mug and prior:bowl are both prior.
-        ["where the masses come from", _counted(twin["mass_source"].partition(":")[0] for twin in twins)],
+        ["where the masses come from", _count_words(twin["mass_source"].partition(":")[0] for twin in twins)],
     ]
     spread = [
-        _spread("longest side (m)", [twin["longest_m"] for twin in twins]),
-        _spread("mass (kg)", [twin["mass_kg"] for twin in twins]),
-        _spread("collision hulls", [twin["hulls"] for twin in twins]),
-        _spread("verified grasps", [twin["verified"] for twin in twins]),
-        _spread("share of grasps that held", [twin["success_rate"] for twin in twins]),
+        _percentile_row("longest side (m)", [twin["longest_m"] for twin in twins]),
+        _percentile_row("mass (kg)", [twin["mass_kg"] for twin in twins]),
+        _percentile_row("collision hulls", [twin["hulls"] for twin in twins]),
+        _percentile_row("verified grasps", [twin["verified"] for twin in twins]),
+        _percentile_row("share of grasps that held", [twin["success_rate"] for twin in twins]),
     ]
     head = ["of a twin", "least", "5 %", "median", "95 %", "most"]
     return [*table(["", "all"], totals), "", *table(head, spread)]
@@ -78,7 +78,7 @@ def licence_lines(twins: Rows) -> list[str]:
     return table(["licence", "twins", "with attribution"], rows)
 
 
-def _counted(words: Iterable[str]) -> str:
+def _count_words(words: Iterable[str]) -> str:
     count = Counter(words)
     return ", ".join(f"{markdown_escaped(name)} {number:,}" for name, number in sorted(count.items()))
 
@@ -92,5 +92,5 @@ def _mean_share(shares: Sequence[float | None]) -> str:
     return f"{float(np.mean(known)):.1%} ({len(known):,} twins)" if known else "not tried"
 
 
-def _spread(label: str, values: Sequence[float]) -> list[str]:
+def _percentile_row(label: str, values: Sequence[float]) -> list[str]:
     return [label, *(f"{value:.3g}" for value in np.percentile(values, (0, 5, 50, 95, 100)))]

@@ -47,7 +47,7 @@ class Selection:
     rehearsals: int
 
 
-class Allowed:
+class LicencePolicy:
     """Terms of publication: allowed licences by case-insensitive name (None: all but unknown), and whether rehearsals are
     allowed.
     """
@@ -75,7 +75,7 @@ def terms_of(twins: Iterable[Mapping[str, Any]]) -> Iterator[tuple[str, list[Ter
         yield twin["twin_id"], [Terms(twin["license"] or UNKNOWN, REHEARSAL in twin["failed_checks"])]
 
 
-def select(noun: str, things: Iterable[tuple[str, Sequence[Terms]]], allowed: Allowed) -> Selection:
+def select(noun: str, things: Iterable[tuple[str, Sequence[Terms]]], allowed: LicencePolicy) -> Selection:
     """Select the items whose twins are all allowed; raises UsageError if none is."""
     published, kept_back, left_out = dict[str, int](), set[str](), Counter[str]()
     for name, twins in things:
@@ -87,11 +87,11 @@ def select(noun: str, things: Iterable[tuple[str, Sequence[Terms]]], allowed: Al
             left_out[why] += 1
     rehearsals = left_out.pop(A_REHEARSAL, 0)
     if not published:
-        raise _nothing_goes_out(noun, left_out, rehearsals)
+        raise _nothing_published_error(noun, left_out, rehearsals)
     return Selection(published, frozenset(kept_back), dict(sorted(left_out.items())), rehearsals)
 
 
-def _nothing_goes_out(noun: str, left_out: Mapping[str, int], rehearsals: int) -> UsageError:
+def _nothing_published_error(noun: str, left_out: Mapping[str, int], rehearsals: int) -> UsageError:
     if rehearsals:
         return UsageError(
             f"no {noun} can be published: {rehearsals:,} were made with a rehearsal server (manitwin fake); build the"
@@ -122,7 +122,7 @@ def licenses_page(name: str, twins: Sequence[Mapping[str, Any]], *, introduction
     for twin in twins:
         authors = by_licence.setdefault(twin["license"], {})
         authors.setdefault(twin["attribution"] or "", []).append(twin["twin_id"])
-    counted = [[_linked(name), f"{sum(map(len, ids.values())):,}"] for name, ids in sorted(by_licence.items())]
+    counted = [[_licence_link(name), f"{sum(map(len, ids.values())):,}"] for name, ids in sorted(by_licence.items())]
     lines = [
         f"# Licences of {markdown_escaped(name)}",
         "",
@@ -142,7 +142,7 @@ def licenses_page(name: str, twins: Sequence[Mapping[str, Any]], *, introduction
     return "\n".join(lines) + "\n"
 
 
-def _linked(licence: str) -> str:
+def _licence_link(licence: str) -> str:
     words = markdown_escaped(licence)
     if licence == UNKNOWN or licence.startswith("LicenseRef-") or " " in licence:
         return words

@@ -17,7 +17,7 @@ HOME_FOLDER = re.compile(rb"(?<![\w.\-])/(?:home|Users)/[^/\s\"]+/|\b[A-Za-z]:[\
 _TEXT = (".json", ".txt")
 
 
-def places_of(roots: Iterable[DatasetRoot]) -> tuple[bytes, ...]:
+def local_paths(roots: Iterable[DatasetRoot]) -> tuple[bytes, ...]:
     """Return the paths of local folders as bytes to search for in files, with and without symbolic links resolved."""
     local = [root.local for root in roots if root.local is not None]
     found = {str(path) for folder in local for path in (folder.absolute(), folder.resolve())}
@@ -41,7 +41,7 @@ def check_part(twin_id: str, part: str, content: bytes, places: tuple[bytes, ...
     _refuse_folders(f"{twin_id}/{part}", content, places, TwinError, remedy, of_people=of_people)
 
 
-def check_words(where: str, words: str, places: tuple[bytes, ...], error: type[ManiTwinError]) -> None:
+def check_text(where: str, words: str, places: tuple[bytes, ...], error: type[ManiTwinError]) -> None:
     """Raise ``error`` if a text to be published names a local folder of the data set or a home directory."""
     remedy = "remove it from the name, the prompt or the attribution that it comes from"
     _refuse_folders(where, words.encode(), places, error, remedy, of_people=True)

@@ -57,7 +57,7 @@ class Publication:
         self.sizes: dict[str, int] = {}
         self._receipts: dict[str, dict[str, Any]] = {}
 
-    def refuse_others(self) -> None:
+    def require_own_root(self) -> None:
         """Raise UsageError unless the root is empty or has a publication of this kind, interrupted or older."""
         root = self.root
         root.fs.invalidate_cache()
@@ -77,7 +77,7 @@ class Publication:
 
     def begin(self) -> None:
         """Open a new, interrupted or older publication. Raises UsageError if the root has anything else."""
-        self.refuse_others()
+        self.require_own_root()
         root = self.root
         if not root.exists(_STARTED):
             if self.kind == TWINS and self._is_finished():

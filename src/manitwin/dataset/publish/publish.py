@@ -16,14 +16,14 @@ from manitwin.dataset.publish.card import CardFacts, dataset_card
 from manitwin.dataset.publish.card_statistics import COLUMNS
 from manitwin.dataset.publish.licences import (
     LICENSES_MD,
-    Allowed,
+    LicencePolicy,
     Selection,
     licenses_page,
     select,
     terms_of,
     without_attribution,
 )
-from manitwin.dataset.publish.privacy import places_of
+from manitwin.dataset.publish.privacy import local_paths
 from manitwin.dataset.publish.publication import Publication
 from manitwin.dataset.publish.shard_plan import HUB_FILE_BYTES, Shard, ShardTwin, plan_shards, tar_bytes_of_twins
 from manitwin.dataset.publish.shards import write_shard
@@ -98,14 +98,14 @@ def publish_dataset(
     ``twins_per_shard`` twins. The same data set gives the same bytes. After an interruption, call it again: finished shards are
     kept. Raises UsageError for invalid arguments, and TwinError for a twin that is altered, incomplete or names a local folder.
     """
-    _check(shard_size_mb, twins_per_shard)
+    _check_limits(shard_size_mb, twins_per_shard)
     source, publication = DatasetRoot(dataset), Publication(DatasetRoot(out))
     tar_bytes = tar_bytes_of_twins(source)
     parts = parts_of_index(source, set(tar_bytes))
     columns = ["twin_id", "revision", "license", "attribution", "category", "seconds", "cpu_seconds", "cost_usd"]
     columns.append("failed_checks")
     rows = rows_of_table(source, parts, "twins", columns)
-    selection = select("accepted twin", terms_of(rows), Allowed(license_allow, with_rehearsals))
+    selection = select("accepted twin", terms_of(rows), LicencePolicy(license_allow, with_rehearsals))
     shards = plan_shards(
         _shard_twins(rows, tar_bytes, selection), max_bytes=shard_size_mb * MEGABYTE, max_twins=twins_per_shard
     )
@@ -135,7 +135,7 @@ def publish_dataset(
     )
 
 
-def _check(shard_size_mb: int, twins_per_shard: int | None) -> None:
+def _check_limits(shard_size_mb: int, twins_per_shard: int | None) -> None:
     if not 1 <= shard_size_mb <= HUB_FILE_BYTES // MEGABYTE:
         raise UsageError(f"--shard-size-mb is {shard_size_mb}; give 1 to {HUB_FILE_BYTES // MEGABYTE}")
     if twins_per_shard is not None and twins_per_shard < 1:
@@ -160,7 +160,7 @@ def _write_shards(
     source: DatasetRoot, publication: Publication, shards: list[Shard], on_shard: Callable[[ShardDone], None]
 ) -> int:
     """Write all missing shards; return the number of shards that already existed."""
-    places = places_of([source, publication.root])
+    places = local_paths([source, publication.root])
     kept = 0
     for number, shard in enumerate(shards, 1):
         there = publication.has(shard)

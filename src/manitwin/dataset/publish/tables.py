@@ -8,7 +8,7 @@ from typing import Any
 import pyarrow as pa
 
 from manitwin.dataset.index.part_list import PartList, no_index, read_part_list, require_files
-from manitwin.dataset.index.parts import file_system, files_of, merged, read_rows
+from manitwin.dataset.index.parts import file_system, files_of, merge_rows, read_rows
 from manitwin.dataset.index.tables import TABLES
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
@@ -61,7 +61,7 @@ def published_rows(
 
     ``shard_of`` maps twin ids to shards; ``kept_back`` are the accepted twins of the index that are not published.
     """
-    for rows in merged(files_of(root, parts.parts), file_system(root), parts.rows("grasps"), without=kept_back):
+    for rows in merge_rows(files_of(root, parts.parts), file_system(root), parts.rows("grasps"), without=kept_back):
         twins = rows["twins"]
         if not len(twins):  # an id range with rejected twins only
             continue

@@ -9,10 +9,10 @@ from typing import Any, Unpack
 import numpy as np
 
 from manitwin.dataset.index.query import Index
-from manitwin.dataset.review.corrections import Conflict, Correction, settled
-from manitwin.dataset.review.making_again import made_again
+from manitwin.dataset.review.corrections import Conflict, Correction, resolve_corrections
+from manitwin.dataset.review.item_rebuild import rebuild_items
+from manitwin.dataset.review.review_subjects import read_twin, revisions
 from manitwin.dataset.review.store import ReviewStore, reviews_path
-from manitwin.dataset.review.twins_seen import read_twin, revisions
 from manitwin.engine.amendments import Amendments, read_amendments, write_amendments
 from manitwin.engine.drive import RunOptions, RunReport
 from manitwin.engine.ledger.location import local_ledger
@@ -26,7 +26,7 @@ from manitwin.twin.record import TwinRecord
 
 
 @dataclass(frozen=True)
-class Applied:
+class ApplyResult:
     """Result of applying corrections. ``run`` is None if nothing was rebuilt; ``left`` maps twin ids to reasons why they were
     not.
 
@@ -42,7 +42,7 @@ class Applied:
 
 def apply_reviews(
     dataset: str, *, dry_run: bool = False, jobs: int | None = None, **options: Unpack[RunOptions]
-) -> Applied:
+) -> ApplyResult:
     """Write the undisputed corrections into the data set and rebuild the twins from the first stage that they change.
 
     Only verdicts on the current revisions count. Raises UsageError if there are no reviews, no index or no ledger, and if another
@@ -52,21 +52,25 @@ def apply_reviews(
     with ReviewStore(reviews_path(root), make=False) as store:
         stored = store.standing()
     now = revisions(Index(root))
-    corrections, conflicts = settled(each for each in stored if now.get(each.review.twin_id) == each.review.revision)
+    corrections, conflicts = resolve_corrections(
+        each for each in stored if now.get(each.review.twin_id) == each.review.revision
+    )
     twin_ids = list(dict.fromkeys(each.twin_id for each in corrections))
     items = _items(root, twin_ids) if twin_ids else {}
     left = {each: "the ledger has no item for it; build it in this data set" for each in twin_ids if each not in items}
     if dry_run or not items:
-        return Applied([each for each in corrections if each.twin_id not in left], conflicts, left)
+        return ApplyResult([each for each in corrections if each.twin_id not in left], conflicts, left)
     for twin_id in items:
         own = [each for each in corrections if each.twin_id == twin_id]
-        write_amendments(root, twin_id, amended(read_amendments(root, twin_id), own, read_twin(root, twin_id)))
-    run = made_again(root, items.values(), jobs, **options)
+        write_amendments(
+            root, twin_id, merge_corrections(read_amendments(root, twin_id), own, read_twin(root, twin_id))
+        )
+    run = rebuild_items(root, items.values(), jobs, **options)
     applied = [each for each in corrections if each.twin_id not in left]
-    return Applied(applied, conflicts, left, run, _rejected(root, items))
+    return ApplyResult(applied, conflicts, left, run, _rejected(root, items))
 
 
-def amended(before: Amendments, corrections: Iterable[Correction], record: TwinRecord) -> Amendments:
+def merge_corrections(before: Amendments, corrections: Iterable[Correction], record: TwinRecord) -> Amendments:
     """Return a twin's amendments with additional corrections; the last correction of a value wins."""
     after: dict[str, dict[str, Any]] = {stage: dict(said) for stage, said in before.items()}
     for each in corrections:
@@ -78,7 +82,7 @@ def amended(before: Amendments, corrections: Iterable[Correction], record: TwinR
             elif key == MOVES:
                 move = {
                     "candidate": each.value,
-                    "place": place_in_box(_marked_m(record), each.value),
+                    "place": place_in_box(_sampled_positions_m(record), each.value),
                     "label": _label(record, each.name),
                     "source": each.source,
                 }
@@ -88,7 +92,7 @@ def amended(before: Amendments, corrections: Iterable[Correction], record: TwinR
     return after
 
 
-def _marked_m(record: TwinRecord) -> np.ndarray:
+def _sampled_positions_m(record: TwinRecord) -> np.ndarray:
     """Return the positions ``(N, 3)`` in metres of a twin's candidates as sampled, before refinement moved some of them."""
     assert record.points is not None, "an accepted twin has points"
     positions_m = np.array(record.points.candidates.positions_m, float)

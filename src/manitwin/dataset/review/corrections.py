@@ -8,7 +8,7 @@ from typing import Any
 
 from manitwin.dataset.review.store import Stored
 from manitwin.dataset.review.verdicts import DIMENSIONS, Dimension
-from manitwin.models.annotators.prior_names import normalised
+from manitwin.models.annotators.prior_names import normalise_name
 from manitwin.pipeline.human_corrections import HUMAN
 
 
@@ -33,7 +33,7 @@ class Conflict:
     said: dict[str, Any]
 
 
-def settled(reviews: Iterable[Stored]) -> tuple[list[Correction], list[Conflict]]:
+def resolve_corrections(reviews: Iterable[Stored]) -> tuple[list[Correction], list[Conflict]]:
     """Return the corrections on which all annotators of a twin agree, and the conflicts.
 
     ``reviews`` has at most one review per annotator and twin. A correction is contradicted by a different value and by a yes in
@@ -68,5 +68,5 @@ def _proposals(reviews: list[Stored]) -> Iterator[tuple[Dimension, str, dict[str
 
 def _key(value: Any) -> object:
     if isinstance(value, str):
-        return normalised(value)
+        return normalise_name(value)
     return tuple(sorted(value.items())) if isinstance(value, dict) else value

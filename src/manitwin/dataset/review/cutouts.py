@@ -11,7 +11,7 @@ from typing import Unpack
 import numpy as np
 from PIL import Image
 
-from manitwin.dataset.review.making_again import made_again
+from manitwin.dataset.review.item_rebuild import rebuild_items
 from manitwin.dataset.review.photos_left_out import PhotosLeftOut
 from manitwin.engine.amendments import read_amendments, write_amendments
 from manitwin.engine.drive import RunOptions, RunReport
@@ -24,7 +24,7 @@ from manitwin.pipeline.drawn_outline import DRAWN
 from manitwin.pipeline.human_corrections import HUMAN
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotoStage
-from manitwin.pipeline.photo_groups import told_apart
+from manitwin.pipeline.photo_groups import distinct_names
 from manitwin.render.contact_sheet import TILE_PX, contact_sheet
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import RECORD, parse_record
@@ -68,7 +68,7 @@ class DoubtedPhoto:
         if self.place is None:
             return self.item.title
         files = self.item.files
-        return f"{told_apart(files)[self.place]}, photo {self.place + 1} of {len(files)}"
+        return f"{distinct_names(files)[self.place]}, photo {self.place + 1} of {len(files)}"
 
 
 def doubted_photos(root: DatasetRoot) -> list[DoubtedPhoto]:
@@ -93,7 +93,7 @@ def photos_to_draw(root: DatasetRoot, redraw: Iterable[str] = ()) -> list[Doubte
             " 'no_object'), state = 'rejected' AND kind = 'photos' FROM items WHERE twin_id IS NOT NULL AND kind IN ('image',"
             " 'photos') ORDER BY number"
         ).fetchall()
-    chosen = {_only(root, begun, [str(row[1]) for row in rows], "no photo") for begun in redraw}
+    chosen = {_match_prefix(root, begun, [str(row[1]) for row in rows], "no photo") for begun in redraw}
     groups = PhotosLeftOut(root)
     for number, twin_id, said, is_refused, may_lack in rows:
         is_shown = is_refused or twin_id in chosen
@@ -144,7 +144,7 @@ def confirm(
     ``twin_ids`` may be unique prefixes. Raises UsageError, before anything is written, for ids without a doubted matte, and if
     another run is active on the data set.
     """
-    chosen = _chosen(root, doubted_photos(root), twin_ids)
+    chosen = _select_photos(root, doubted_photos(root), twin_ids)
     for photo in chosen:
         amendments = read_amendments(root, photo.twin_id)
         said = amendments.setdefault(PhotoStage.name, {})
@@ -152,16 +152,18 @@ def confirm(
         picture = root.read_bytes(f"{root.twin_name(photo.twin_id)}/{CUTOUT}", UsageError)
         said[CONFIRMED] = confirmation(picture, f"{HUMAN}{annotator}")
         write_amendments(root, photo.twin_id, amendments)
-    return chosen, made_again(root, ((each.number, each.item) for each in chosen), jobs, **options)
+    return chosen, rebuild_items(root, ((each.number, each.item) for each in chosen), jobs, **options)
 
 
-def _chosen(root: DatasetRoot, photos: Sequence[DoubtedPhoto], twin_ids: Iterable[str]) -> list[DoubtedPhoto]:
+def _select_photos(root: DatasetRoot, photos: Sequence[DoubtedPhoto], twin_ids: Iterable[str]) -> list[DoubtedPhoto]:
     known = {photo.twin_id: photo for photo in photos}
-    found = dict.fromkeys(_only(root, said, list(known), "no rejected photo with a cut-out") for said in twin_ids)
+    found = dict.fromkeys(
+        _match_prefix(root, said, list(known), "no rejected photo with a cut-out") for said in twin_ids
+    )
     return [known[twin_id] for twin_id in found]
 
 
-def _only(root: DatasetRoot, begun: str, twin_ids: Sequence[str], none: str) -> str:
+def _match_prefix(root: DatasetRoot, begun: str, twin_ids: Sequence[str], none: str) -> str:
     """Return the one id with a prefix; raises UsageError if there is none or several."""
     alike = [each for each in twin_ids if begun and each.startswith(begun)]
     if len(alike) != 1:

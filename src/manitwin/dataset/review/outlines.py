@@ -13,8 +13,14 @@ from PIL import Image
 
 from manitwin.config import MattingConfig
 from manitwin.dataset.review.cutouts import DoubtedPhoto, photos_to_draw
-from manitwin.dataset.review.making_again import made_again
-from manitwin.dataset.review.said_words import Words, read_name, read_side_cm, with_words, words_of
+from manitwin.dataset.review.item_rebuild import rebuild_items
+from manitwin.dataset.review.object_statements import (
+    ObjectStatement,
+    current_statement,
+    read_name,
+    read_side_cm,
+    with_statement,
+)
 from manitwin.engine.amendments import Amendments, read_amendments, write_amendments
 from manitwin.engine.drive import RunOptions, RunReport
 from manitwin.errors import InputError, Rejected, UsageError
@@ -23,13 +29,13 @@ from manitwin.models.matting.matte import matte_photo
 from manitwin.pipeline.cutout import CONFIRMED, CUTOUT, QUALITY, SHOWN_PX, reduced
 from manitwin.pipeline.drawn_outline import (
     DrawnOutline,
-    as_drawn,
+    cut_by_outline,
     drawn_outline,
     mask_of_png,
     why_no_outline,
     with_outline,
 )
-from manitwin.pipeline.given_alpha import Given
+from manitwin.pipeline.given_alpha import CutOutInput
 from manitwin.pipeline.human_corrections import HUMAN
 from manitwin.pipeline.item import masks_of
 from manitwin.pipeline.photo import PhotoStage
@@ -57,12 +63,12 @@ class OutlineSession:
         self._lock, self._writing = threading.Lock(), threading.Lock()
 
     @property
-    def kept(self) -> tuple[str, ...]:
+    def outlined_keys(self) -> tuple[str, ...]:
         """Keys of the photos whose outlines were stored, in order."""
         return tuple(self._kept)
 
     @property
-    def said(self) -> tuple[str, ...]:
+    def restated_twins(self) -> tuple[str, ...]:
         """Ids of the twins whose name or size was changed, in order."""
         return tuple(self._said)
 
@@ -72,10 +78,10 @@ class OutlineSession:
             raise UsageError(f"{key}: not a photo with a doubtful cut-out; reload the list")
         return self.photos[key]
 
-    def words(self, key: str) -> Words:
+    def words(self, key: str) -> ObjectStatement:
         """Return the current name and size statements on the photo's object."""
         photo = self.photo(key)
-        return words_of(photo.item, read_amendments(self.root, photo.twin_id))
+        return current_statement(photo.item, read_amendments(self.root, photo.twin_id))
 
     def picture(self, key: str) -> bytes:
         """Return the displayed picture of a photo as a WebP file."""
@@ -92,13 +98,13 @@ class OutlineSession:
         same = drawn is not None and drawn.mask.shape == rgba.shape[:2]
         return _png(drawn.mask if drawn is not None and same else rgba[..., 3] > 127)
 
-    def fitted(self, key: str, png: bytes) -> bytes:
+    def snap_mask(self, key: str, png: bytes) -> bytes:
         """Return an outline mask (PNG) snapped to nearby image edges, as PNG; raises UsageError for an invalid mask."""
         rgba = self._rgba(key)
         with self._lock:  # OpenCV's random number generator is shared by the process
             return _png(fit_outline(rgba[..., :3], self._mask(png, rgba)))
 
-    def keep(self, key: str, png: bytes | None, name: object = None, longest_side_cm: object = None) -> None:
+    def store_outline(self, key: str, png: bytes | None, name: object = None, longest_side_cm: object = None) -> None:
         """Store an outline mask (PNG), a name and a longest side (cm) for all later builds; None leaves a value unchanged.
 
         Raises UsageError, and stores nothing, if the outline does not segment a single object, if the name or length is invalid,
@@ -108,12 +114,12 @@ class OutlineSession:
         drawn = None if png is None else self._drawn(key, png, source)
         with self._writing:
             before = read_amendments(self.root, photo.twin_id)
-            now = words_of(photo.item, before)
-            words = Words(
+            now = current_statement(photo.item, before)
+            words = ObjectStatement(
                 now.name if name is None else read_name(name),
                 now.longest_side_cm if longest_side_cm is None else read_side_cm(longest_side_cm, self._gate),
             )
-            after = with_words(before, photo.item, words, source)
+            after = with_statement(before, photo.item, words, source)
             if drawn is not None:
                 said = {key: each for key, each in after.get(PhotoStage.name, {}).items() if key != CONFIRMED}
                 after[PhotoStage.name] = with_outline(said, drawn, photo.place)
@@ -123,7 +129,7 @@ class OutlineSession:
                     self._require_same_picture(replace(photo, place=place), words.name, after)
             if after != before:
                 write_amendments(self.root, photo.twin_id, after)
-            if words_of(photo.item, after) != now:
+            if current_statement(photo.item, after) != now:
                 self._said[photo.twin_id] = None
             if drawn is not None:
                 self._kept[key] = None
@@ -133,7 +139,7 @@ class OutlineSession:
         by_twin = {photo.twin_id: photo for photo in self.photos.values()}
         changed = dict.fromkeys((*(self.photos[key].twin_id for key in self._kept), *self._said))
         chosen = [by_twin[twin_id] for twin_id in changed]
-        return made_again(self.root, ((each.number, each.item) for each in chosen), jobs, **options)
+        return rebuild_items(self.root, ((each.number, each.item) for each in chosen), jobs, **options)
 
     def _drawn(self, key: str, png: bytes, source: str) -> DrawnOutline:
         rgba = self._rgba(key)
@@ -142,7 +148,7 @@ class OutlineSession:
             raise UsageError(f"not kept: the outline {why}; draw it around the object")
         try:
             matte_photo(
-                as_drawn(Given(rgba[..., :3]), drawn, "this photo").pixels,
+                cut_by_outline(CutOutInput(rgba[..., :3]), drawn, "this photo").pixels,
                 "this photo",
                 min_area_share=self._settings.min_area_share,
                 second_object_share=self._settings.second_object_share,
@@ -168,7 +174,7 @@ class OutlineSession:
         if photo.sha256 is None:
             with self._lock:
                 if key not in self._looked_at:
-                    self._looked_at[key] = _seen_again(photo, self.words(key).name, self._settings)
+                    self._looked_at[key] = _segment_again(photo, self.words(key).name, self._settings)
             return self._looked_at[key]
         name = f"{self.root.twin_name(photo.twin_id)}/{CUTOUT}"
         with Image.open(io.BytesIO(self.root.read_bytes(name, UsageError))) as picture:
@@ -186,8 +192,8 @@ class OutlineSession:
         return mask
 
 
-def _seen_again(photo: DoubtedPhoto, name: str, settings: MattingConfig) -> np.ndarray:
-    """Return a photo ``(H, W, 4) uint8`` as ``shown_cutout`` would: segmented without further networks, with zero alpha on
+def _segment_again(photo: DoubtedPhoto, name: str, settings: MattingConfig) -> np.ndarray:
+    """Return a photo ``(H, W, 4) uint8`` as ``encode_preview`` would: segmented without further networks, with zero alpha on
     failure.
 
     Raises UsageError if the photo can no longer be read.

@@ -7,7 +7,7 @@ from functools import cached_property
 from manitwin.config import BuildConfig
 from manitwin.engine.amendments import read_amendments
 from manitwin.engine.stage import Draft
-from manitwin.engine.stage_runner import is_whole, stage_key
+from manitwin.engine.stage_runner import is_complete_result, stage_key
 from manitwin.models.matting.learned import find_networks
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotosStage
@@ -32,7 +32,7 @@ class PhotosLeftOut:
             return []
         draft = Draft(twin_id, item, self._config.seed, amendments=read_amendments(self._root, twin_id))
         place = self._root.local / WORK / twin_id / self._stage.name / stage_key(self._stage, draft)
-        if not is_whole(place, digests=False):
+        if not is_complete_result(place, digests=False):
             return []
         cut_out = {int(picture.stem) for picture in (place / "photos").glob("*.png")}
         return [number for number in range(len(item.files)) if number not in cut_out]

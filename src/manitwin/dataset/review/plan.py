@@ -9,9 +9,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.review.queues import Plan, queue_of
+from manitwin.dataset.review.review_subjects import revisions
 from manitwin.dataset.review.sample import listed_twins, strata_counts, stratified_sample
 from manitwin.dataset.review.store import ReviewStore, reviews_path
-from manitwin.dataset.review.twins_seen import revisions
 from manitwin.dataset.review.verdict_files import write_form
 from manitwin.dataset.review.verdicts import AnnotatorName, reason_of
 from manitwin.errors import UsageError
@@ -43,7 +43,7 @@ def write_forms(dataset: str, plan: Plan, form: Path | None, annotators: Sequenc
     root = DatasetRoot(dataset)
     now = revisions(Index(root))
     with ReviewStore(reviews_path(root)) as store:
-        judged = store.judged()
+        judged = store.annotators_by_revision()
     done = {twin_id: judged.get(twin_id, {}).get(revision, set()) for twin_id, revision in now.items()}
     written = []
     for name in names:

@@ -8,6 +8,7 @@ from typing import Any
 
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.review.queues import share_of
+from manitwin.dataset.review.review_subjects import pictures_of, revisions
 from manitwin.dataset.review.store import ReviewStore, Stored, reviews_path
 from manitwin.dataset.review.tally import (
     Accuracy,
@@ -18,7 +19,6 @@ from manitwin.dataset.review.tally import (
     prompt_versions,
     speeds,
 )
-from manitwin.dataset.review.twins_seen import pictures_of, revisions
 from manitwin.dataset.review.verdict_table import table_of, write_verdicts
 from manitwin.dataset.review.verdicts import DIMENSIONS, Dimension
 from manitwin.errors import UsageError
@@ -28,7 +28,7 @@ from manitwin.twin.dataset_root import DatasetRoot
 SHOWN = 20
 
 
-def shown_correction(value: object) -> str:
+def correction_text(value: object) -> str:
     """Return a corrected value as text; a quantity with the annotator's interval."""
     if isinstance(value, dict):
         return f"{value['value']:g} ({value['low']:g} to {value['high']:g})"
@@ -81,14 +81,14 @@ class ReviewReport:
         lines += [_accuracy_line(each) for each in self.accuracies]
         lines += [_speed_line(each) for each in self.speeds]
         for dimension, twin_ids in self.disputed.items():
-            lines.append(f"disputed {dimension}: {_some(twin_ids)}")
+            lines.append(f"disputed {dimension}: {_abbreviated_list(twin_ids)}")
         for version in self.prompts:
             if version.no:
                 lines.append(
                     f"{version.dimension} by {version.prompt}: {version.no} no, {version.yes} yes, {version.unsure} unsure"
                 )
         for each in self.disagreements[:SHOWN]:
-            said = "".join(f", {name} is {shown_correction(value)}" for name, value in each.corrections.items())
+            said = "".join(f", {name} is {correction_text(value)}" for name, value in each.corrections.items())
             note = f" ({printable_line('; '.join(each.notes))})" if each.notes else ""
             picture = f" {each.pictures[-1]}" if each.pictures else ""
             lines.append(f"no: {each.twin_id} {each.dimension}{said}{note}{picture}")
@@ -120,7 +120,7 @@ def review_report(dataset: str) -> ReviewReport:
     """Return the report on a data set; raises UsageError if there is no index or no review."""
     root = DatasetRoot(dataset)
     with ReviewStore(reviews_path(root), make=False) as store:
-        stored, plan, undone, annotators = store.standing(), store.plan(), store.undone(), store.annotators()
+        stored, plan, undone, annotators = store.standing(), store.plan(), store.undo_counts(), store.annotators()
     now = revisions(Index(root))
     current = [each for each in stored if now.get(each.review.twin_id) == each.review.revision]
     wanted = None if plan is None else set(plan.twins)
@@ -131,7 +131,7 @@ def review_report(dataset: str) -> ReviewReport:
     if plan is not None:
         there = [twin_id for twin_id in plan.twins if twin_id in now]
         of_now = type(plan)(tuple(there), plan.seed, plan.overlap, plan.raters)
-        done = judges(current)
+        done = annotators_by_twin(current)
         names = sorted({*annotators, *(each.review.annotator for each in stored)})
         queues = {name: share_of(name, of_now, names, done) for name in names}
     return ReviewReport(
@@ -149,7 +149,7 @@ def review_report(dataset: str) -> ReviewReport:
     )
 
 
-def judges(reviews: list[Stored]) -> dict[str, set[str]]:
+def annotators_by_twin(reviews: list[Stored]) -> dict[str, set[str]]:
     """Return the annotators who reviewed each twin."""
     found: dict[str, set[str]] = {}
     for each in reviews:
@@ -221,7 +221,7 @@ def _speed_line(each: Speed) -> str:
     return f"{each.annotator}: {each.reviews} reviews{pace}{rest}{about}{undone}"
 
 
-def _some(twin_ids: list[str]) -> str:
+def _abbreviated_list(twin_ids: list[str]) -> str:
     return ", ".join(twin_ids[:SHOWN]) + (", ..." if len(twin_ids) > SHOWN else "")
 
 

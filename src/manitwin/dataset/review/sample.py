@@ -17,7 +17,7 @@ COLUMNS = ("twin_id", "category", "longest_m", "kind")
 
 
 @dataclass(frozen=True)
-class Listed:
+class SampledTwin:
     """A twin with its stratification variables: category, longest side (m), kind of input; None if the index lacks them."""
 
     twin_id: str
@@ -32,13 +32,13 @@ class Listed:
         return self.category or "?", size, self.kind or "?"
 
 
-def listed_twins(index: Index) -> list[Listed]:
+def listed_twins(index: Index) -> list[SampledTwin]:
     """Return all accepted twins of an index, sorted by id."""
     rows = index.select("twins", columns=COLUMNS).to_pylist()
-    return [Listed(**row) for row in rows]
+    return [SampledTwin(**row) for row in rows]
 
 
-def stratified_sample(twins: Iterable[Listed], size: int, seed: int) -> list[str]:
+def stratified_sample(twins: Iterable[SampledTwin], size: int, seed: int) -> list[str]:
     """Return the ids of ``size`` twins (of all twins if there are fewer), shuffled by the seed.
 
     Systematic sampling of a list sorted by strata (W. G. Cochran, Sampling Techniques, 3rd ed., section 8.3: implicit
@@ -57,7 +57,7 @@ def stratified_sample(twins: Iterable[Listed], size: int, seed: int) -> list[str
     return sorted(chosen, key=lambda twin_id: _drawn(seed + 1, twin_id))
 
 
-def strata_counts(twins: Sequence[Listed], chosen: Iterable[str]) -> Mapping[str, tuple[int, int]]:
+def strata_counts(twins: Sequence[SampledTwin], chosen: Iterable[str]) -> Mapping[str, tuple[int, int]]:
     """Return, per category, the number of twins in the sample and in total."""
     wanted, counts = set(chosen), dict[str, tuple[int, int]]()
     for twin in twins:

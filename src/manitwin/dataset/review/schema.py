@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 
 from manitwin.errors import UsageError
-from manitwin.formats.schema_version import of_newer_schema
+from manitwin.formats.schema_version import newer_schema_message
 
 MIGRATIONS = (
     """
@@ -54,6 +54,6 @@ def migrate(connection: sqlite3.Connection, path: str) -> None:
     """Migrate a store to the newest schema; raises UsageError for a store of a newer version of this package."""
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if version > len(MIGRATIONS):
-        raise UsageError(of_newer_schema(path, version, len(MIGRATIONS)))
+        raise UsageError(newer_schema_message(path, version, len(MIGRATIONS)))
     for number, script in enumerate(MIGRATIONS[version:], version + 1):
         connection.executescript(f"BEGIN IMMEDIATE; {script}; PRAGMA user_version = {number}; COMMIT;")

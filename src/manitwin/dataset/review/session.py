@@ -13,8 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.review.plan import require_annotator
 from manitwin.dataset.review.queues import Plan, queue_of, share_of
+from manitwin.dataset.review.review_subjects import check_corrections, prompts_of, revisions
 from manitwin.dataset.review.store import ReviewStore, Stored
-from manitwin.dataset.review.twins_seen import check_corrections, prompts_of, revisions
 from manitwin.dataset.review.verdicts import Review, reason_of
 from manitwin.errors import UsageError
 from manitwin.twin.record import TwinRecord
@@ -23,7 +23,7 @@ FRESH_S = 10.0
 """Seconds for which the list of twin revisions is cached; a rebuilt twin enters the queue with at most this delay."""
 
 
-class Said(BaseModel):
+class ReviewRequest(BaseModel):
     """Request body that confirms a review. ``request`` is an id chosen by the page, so that a repeated request counts once."""
 
     model_config = ConfigDict(extra="forbid")
@@ -69,14 +69,14 @@ class ReviewSession:
 
     def progress(self, annotator: str) -> Progress:
         """Return the progress of an annotator."""
-        now, judged = self._revisions(), self.store.judged()
+        now, judged = self._revisions(), self.store.annotators_by_revision()
         done = sum(annotator in judged.get(twin_id, {}).get(now.get(twin_id, ""), ()) for twin_id in self.plan.twins)
         return Progress(done, len(self._queue(annotator, share_of)), self.store.median_seconds(annotator))
 
     def confirm(self, annotator: str, record: TwinRecord, body: Mapping[str, Any]) -> None:
         """Store a review; raises UsageError for an invalid ``body``, and for a twin that was rebuilt since it was shown."""
         try:
-            said = Said.model_validate(body)
+            said = ReviewRequest.model_validate(body)
             if said.revision != record.revision:
                 raise UsageError(f"{record.twin_id} was rebuilt since it was shown; reload the page")
             review = Review.model_validate(
@@ -95,7 +95,7 @@ class ReviewSession:
         return self.store.undo(annotator, f"{annotator}:{request[:64]}")
 
     def _queue(self, annotator: str, of: Callable[..., list[str]] = queue_of) -> list[str]:
-        now, judged = self._revisions(), self.store.judged()
+        now, judged = self._revisions(), self.store.annotators_by_revision()
         names = sorted({*self.annotators, *self.store.annotators()})
         there = Plan(tuple(t for t in self.plan.twins if t in now), self.plan.seed, self.plan.overlap, self.plan.raters)
         done = {twin_id: judged.get(twin_id, {}).get(now[twin_id], set()) for twin_id in there.twins}

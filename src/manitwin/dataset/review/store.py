@@ -28,7 +28,7 @@ from manitwin.dataset.review.verdicts import Review, reason_of
 from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.json_file import parse_json_object
-from manitwin.formats.sqlite_store import BUSY_S, damaged, errors_named, flaw_in, transaction
+from manitwin.formats.sqlite_store import BUSY_S, damaged_file_error, name_file_in_errors, schema_flaw, transaction
 from manitwin.twin.dataset_root import DatasetRoot
 
 REVIEWS = "reviews.sqlite"
@@ -68,16 +68,18 @@ class ReviewStore:
             )
         if os.path.lexists(path):
             open_regular(path, UsageError, inside=path.parent, name=str(path)).close()
-        with self._sound():
+        with self._sqlite_errors():
             self._connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False, timeout=BUSY_S)
             try:
                 self._connection.execute("PRAGMA trusted_schema = OFF")
                 self._connection.execute("PRAGMA journal_mode = WAL")
                 self._connection.execute("PRAGMA synchronous = FULL")
                 migrate(self._connection, str(path))
-                flaw = flaw_in(self._connection, lambda ours: migrate(ours, ":memory:"), tables_of="a store of reviews")
+                flaw = schema_flaw(
+                    self._connection, lambda ours: migrate(ours, ":memory:"), tables_of="a store of reviews"
+                )
                 if flaw is not None:
-                    raise damaged(path, flaw, _DAMAGED)
+                    raise damaged_file_error(path, flaw, _DAMAGED)
             except BaseException:
                 self._connection.close()
                 raise
@@ -133,7 +135,7 @@ class ReviewStore:
             self._put_draft(connection, annotator, said.twin_id, said.model_dump(mode="json"))
             return stored
 
-    def follow(self, revisions: Mapping[str, tuple[str, str]]) -> None:
+    def record_successors(self, revisions: Mapping[str, tuple[str, str]]) -> None:
         """Record pairs of revisions (before, after) of twins that differ in nothing that is judged; reviews of the former stay
         valid.
         """
@@ -151,7 +153,7 @@ class ReviewStore:
         The revision of a review is replaced by the last one that ``follow`` recorded as its successor.
         """
         latest = f"SELECT max(number) FROM events WHERE {_LIVE} GROUP BY annotator, twin_id, revision"
-        followed, last = self.followed(), dict[tuple[str, str, str], Stored]()
+        followed, last = self.successor_function(), dict[tuple[str, str, str], Stored]()
         for stored in self._rows(f"number IN ({latest}) ORDER BY number", ()):
             said = stored.review
             now = followed(said.twin_id, said.revision)
@@ -159,7 +161,7 @@ class ReviewStore:
             last[said.annotator, said.twin_id, now] = moved
         return sorted(last.values(), key=lambda stored: stored.number)
 
-    def followed(self) -> Callable[[str, str], str]:
+    def successor_function(self) -> Callable[[str, str], str]:
         """Return a function that maps a twin id and revision to the last recorded successor of the revision."""
         known = {
             (twin, before): after
@@ -183,7 +185,7 @@ class ReviewStore:
         if not found:
             return None
         said = found[0].review
-        now = self.followed()(twin_id, said.revision)
+        now = self.successor_function()(twin_id, said.revision)
         return replace(found[0], review=said.model_copy(update={"revision": now}))
 
     def median_seconds(self, annotator: str) -> float | None:
@@ -194,7 +196,7 @@ class ReviewStore:
         told = [float(seconds) for (seconds,) in rows if isinstance(seconds, int | float)]
         return statistics.median(told) if told else None
 
-    def undone(self) -> dict[str, int]:
+    def undo_counts(self) -> dict[str, int]:
         """Return the number of withdrawn reviews per annotator."""
         rows = self._select("SELECT annotator, count(*) FROM events WHERE kind = 'undo' GROUP BY annotator", ())
         return dict(rows)
@@ -224,7 +226,7 @@ class ReviewStore:
         try:
             return Plan(tuple(said["twins"]), said["seed"], said["overlap"], said["raters"])
         except (KeyError, TypeError) as error:
-            raise damaged(self.path, f"a sample without {error}", _DAMAGED) from error
+            raise damaged_file_error(self.path, f"a sample without {error}", _DAMAGED) from error
 
     def add_plan(self, plan: Plan) -> None:
         """Append a sample unless it equals the last one."""
@@ -245,10 +247,10 @@ class ReviewStore:
         """Return the sorted names of all annotators."""
         return [name for (name,) in self._select("SELECT name FROM annotators ORDER BY name", ())]
 
-    def judged(self) -> dict[str, dict[str, set[str]]]:
+    def annotators_by_revision(self) -> dict[str, dict[str, set[str]]]:
         """Return the annotators of the standing reviews, by twin and revision."""
         found: dict[str, dict[str, set[str]]] = {}
-        followed = self.followed()
+        followed = self.successor_function()
         rows = self._select(f"SELECT DISTINCT twin_id, revision, annotator FROM events WHERE {_LIVE}", ())
         for twin_id, revision, annotator in rows:
             found.setdefault(twin_id, {}).setdefault(followed(twin_id, revision), set()).add(annotator)
@@ -259,23 +261,23 @@ class ReviewStore:
         return [Stored(number, at, self._review(number, body)) for number, at, body in rows]
 
     def _select(self, sql: str, values: tuple[Any, ...]) -> list[Any]:
-        with self._lock, self._sound():
+        with self._lock, self._sqlite_errors():
             return self._connection.execute(sql, values).fetchall()
 
     def _review(self, number: int, body: str) -> Review:
         try:
             return Review.model_validate_json(body)
         except ValidationError as error:
-            raise damaged(self.path, f"event {number}: {reason_of(error)}", _DAMAGED) from error
+            raise damaged_file_error(self.path, f"event {number}: {reason_of(error)}", _DAMAGED) from error
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
         """Provide a transaction that is durable once the block ends without an error, and is otherwise rolled back."""
-        with self._lock, self._sound(), transaction(self._connection):
+        with self._lock, self._sqlite_errors(), transaction(self._connection):
             yield self._connection
 
-    def _sound(self) -> AbstractContextManager[None]:
-        return errors_named(self.path, _DAMAGED)
+    def _sqlite_errors(self) -> AbstractContextManager[None]:
+        return name_file_in_errors(self.path, _DAMAGED)
 
 
 def _text(review: Review) -> str:

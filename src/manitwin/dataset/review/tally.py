@@ -10,7 +10,7 @@ from statistics import median
 from manitwin.dataset.review.agreement import Agreement, agreement_of
 from manitwin.dataset.review.store import Stored
 from manitwin.dataset.review.verdicts import ANSWERS, DIMENSIONS, PAPER_ACCURACY, Dimension
-from manitwin.twin.shares import wilson_interval
+from manitwin.twin.proportions import wilson_interval
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,14 @@ import numpy as np
 
 from manitwin.config import BuildConfig
 from manitwin.dataset.index.query import Index
+from manitwin.dataset.review.review_subjects import read_twin, revisions
 from manitwin.dataset.review.store import ReviewStore, Stored, reviews_path
 from manitwin.dataset.review.tally import majority
-from manitwin.dataset.review.twins_seen import read_twin, revisions
 from manitwin.dataset.review.verdicts import Dimension
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.errors import UsageError
 from manitwin.formats.json_file import read_json_object
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.prior_records import Interval
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.record import TwinRecord
@@ -63,7 +63,7 @@ class Tunable:
 
 
 @dataclass(frozen=True)
-class Tuned:
+class TuningResult:
     """Results for one threshold, as counts of twins.
 
     ``best`` agrees most with all verdicts. The held-out counts refer to thresholds chosen without the twins that they are applied
@@ -107,7 +107,7 @@ class Tuned:
         )
 
 
-def tune_dataset(dataset: str) -> list[Tuned]:
+def tune_dataset(dataset: str) -> list[TuningResult]:
     """Return the result for each threshold from the verdicts on the current revisions of a data set's twins.
 
     Raises UsageError if there is no index or no current review.
@@ -128,17 +128,19 @@ def tune_dataset(dataset: str) -> list[Tuned]:
     return tune(reviews, records, configuration)
 
 
-def tune(reviews: Iterable[Stored], records: Mapping[str, TwinRecord], configuration: Mapping[str, Any]) -> list[Tuned]:
+def tune(
+    reviews: Iterable[Stored], records: Mapping[str, TwinRecord], configuration: Mapping[str, Any]
+) -> list[TuningResult]:
     """Return the result for each threshold; ``records`` are the reviewed accepted twins by id."""
     answers: dict[tuple[str, Dimension], list[str]] = {}
     for review in (each.review for each in reviews):
         for dimension, answer in review.answers.items():
             answers.setdefault((review.twin_id, dimension), []).append(answer)
     decided = {place: majority(of) for place, of in answers.items()}
-    return [_tuned(each, decided, records, each.current(configuration)) for each in TUNABLES]
+    return [_tune_threshold(each, decided, records, each.current(configuration)) for each in TUNABLES]
 
 
-def toml_of(tuned: Sequence[Tuned]) -> str:
+def proposals_toml(tuned: Sequence[TuningResult]) -> str:
     """Return the proposals as TOML configuration with their evidence as comments; empty if there are none."""
     sections: dict[str, list[str]] = {}
     for each in tuned:
@@ -171,9 +173,9 @@ def sign_test(better: int, worse: int) -> float:
     return sum(comb(changed, count) for count in range(better, changed + 1)) / 2**changed
 
 
-def _tuned(
+def _tune_threshold(
     tunable: Tunable, decided: Mapping[tuple[str, Dimension], str], records: Mapping[str, TwinRecord], current: float
-) -> Tuned:
+) -> TuningResult:
     judged = []
     for (twin_id, dimension), answer in decided.items():
         if dimension == tunable.dimension and answer != "unsure" and twin_id in records:
@@ -186,7 +188,7 @@ def _tuned(
     counts = int(right.sum()), int((~right).sum())
     nothing = (tunable.key, tunable.dimension, current, *counts)
     if min(counts) < LEAST_OF_EACH:
-        return Tuned(*nothing, None, 0, 0, 0, 0, 1.0, f"too few verdicts, {LEAST_OF_EACH} of each are needed")
+        return TuningResult(*nothing, None, 0, 0, 0, 0, 1.0, f"too few verdicts, {LEAST_OF_EACH} of each are needed")
     best = best_threshold(values, right, current, tunable.at_least)
     refused = _refused(values, best, tunable.at_least)
     held_out = np.zeros(len(values), bool)
@@ -204,7 +206,7 @@ def _tuned(
         why_not = "nothing stricter agrees better"
     elif chance > SURE / len(TUNABLES):
         why_not = "not proposed, may be luck"
-    return Tuned(
+    return TuningResult(
         *nothing, best, int((refused & right).sum()), int((refused & ~right).sum()), mended, lost, chance, why_not
     )
 
@@ -233,23 +235,23 @@ def _named_by_classifier(record: TwinRecord, current: float) -> float | None:
     return None if record.naming is None or record.naming.name is None else record.naming.probability.value
 
 
-def _beyond(value: float, usual: Interval) -> float:
+def _excess_factor(value: float, usual: Interval) -> float:
     """Return the factor by which a value lies outside its usual interval; 1 inside."""
     return max(usual.low / value, value / usual.high, 1.0)
 
 
-def _size_beyond(record: TwinRecord, current: float) -> float | None:
-    prior = None if record.language is None else lookup(record.language.category)
+def _size_excess(record: TwinRecord, current: float) -> float | None:
+    prior = None if record.language is None else find_prior(record.language.category)
     if prior is None or record.physical is None:
         return None
-    return _beyond(max(record.physical.extents_m), prior.longest_axis_m)
+    return _excess_factor(max(record.physical.extents_m), prior.longest_axis_m)
 
 
-def _mass_beyond(record: TwinRecord, current: float) -> float | None:
-    prior = None if record.language is None else lookup(record.language.category)
+def _mass_excess(record: TwinRecord, current: float) -> float | None:
+    prior = None if record.language is None else find_prior(record.language.category)
     if prior is None or record.physical is None:
         return None
-    return _beyond(record.physical.mass_kg.value, prior.mass_kg)
+    return _excess_factor(record.physical.mass_kg.value, prior.mass_kg)
 
 
 def _radius(record: TwinRecord, current: float) -> float | None:
@@ -260,8 +262,8 @@ TUNABLES = (
     Tunable("matting", "min_confidence", "mesh", True, _matte),
     Tunable("gate", "min_thickness_share", "mesh", True, _thickness_share),
     Tunable("naming", "min_probability", "category", True, _named_by_classifier),
-    Tunable("physical", "size_margin", "physical", False, _size_beyond),
-    Tunable("physical", "mass_margin", "physical", False, _mass_beyond),
+    Tunable("physical", "size_margin", "physical", False, _size_excess),
+    Tunable("physical", "mass_margin", "physical", False, _mass_excess),
     Tunable("grasps", "association_radius_m", "grasp", False, _radius),
 )
 """Configuration thresholds that accept or reject a twin by a number stored in its record."""

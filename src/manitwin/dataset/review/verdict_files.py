@@ -11,10 +11,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from manitwin.dataset.review.twins_seen import check_corrections, prompts_of, read_twin, said_of
+from manitwin.dataset.review.review_subjects import annotation_text, check_corrections, prompts_of, read_twin
 from manitwin.dataset.review.verdict_table import SCHEMA
 from manitwin.dataset.review.verdicts import DIMENSIONS, Review, reason_of
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.formats.csv_file import read_csv, read_lines
 from manitwin.formats.json_file import parse_json_object
 from manitwin.twin.dataset_root import DatasetRoot
@@ -41,7 +41,7 @@ def write_form(path: Path, root: DatasetRoot, twin_ids: Iterable[str], annotator
         record = read_twin(root, twin_id)
         for dimension in DIMENSIONS:
             row = {"twin_id": twin_id, "revision": record.revision, "annotator": annotator, "dimension": dimension}
-            writer.writerow({**row, SAID: said_of(record, dimension)})
+            writer.writerow({**row, SAID: annotation_text(record, dimension)})
             rows += 1
     write_bytes_atomically(path, text.getvalue().encode())
     return rows
@@ -55,14 +55,14 @@ def read_verdicts(path: Path, root: DatasetRoot) -> list[tuple[Review, str]]:
     accepted.
     """
     if path.suffix not in READ:
-        raise UsageError(f"{path}: {choose_from('suffix', path.suffix, READ)}")
+        raise UsageError(f"{path}: {unknown_name_message('suffix', path.suffix, READ)}")
     given: dict[tuple[str, str, str], list[tuple[int, dict[str, str]]]] = {}
     for count, (line, row) in enumerate(_read_rows(path)):
         if count == MOST_ROWS:
             raise UsageError(f"{path}: more than {MOST_ROWS:,} rows; split the file")
         for name in row:
             if name not in COLUMNS:
-                raise UsageError(f"{path}:{line}: {choose_from('column', name, COLUMNS)}")
+                raise UsageError(f"{path}:{line}: {unknown_name_message('column', name, COLUMNS)}")
         if SAID in row and not str(row.get("answer") or "").strip():
             continue  # an unanswered row of the form
         said = {name: _as_text(value) for name, value in row.items() if value not in (None, "")}

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from manitwin.dataset.review.store import Stored
 from manitwin.dataset.review.verdicts import DIMENSIONS
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.twin.store import write_bytes_atomically
 
 _TEXT, _REAL = pa.string(), pa.float64()
@@ -69,7 +69,7 @@ def _rows(stored: Stored) -> Iterator[dict[str, Any]]:
 def write_verdicts(table: pa.Table, path: Path) -> None:
     """Write a table in the format of the file's suffix; raises UsageError for an unknown suffix."""
     if path.suffix not in FORMATS:
-        raise UsageError(f"{path}: {choose_from('suffix', path.suffix, FORMATS)}")
+        raise UsageError(f"{path}: {unknown_name_message('suffix', path.suffix, FORMATS)}")
     if path.suffix == ".parquet":
         stream = io.BytesIO()
         pq.write_table(table, stream, compression="zstd")

@@ -62,7 +62,7 @@ class Measure(Record):
     high: Annotated[Finite, Field(gt=0)]
 
     @model_validator(mode="after")
-    def _ordered(self) -> Measure:
+    def _check_interval(self) -> Measure:
         if not self.low <= self.value <= self.high:
             raise ValueError(f"{self.value:g} is outside [{self.low:g}, {self.high:g}]")
         return self
@@ -77,7 +77,7 @@ class Corrections(Record):
     points: dict[str, Annotated[int, Field(ge=0)]] = Field(default_factory=dict, max_length=64)
 
     @model_validator(mode="after")
-    def _possible(self) -> Corrections:
+    def _check_values(self) -> Corrections:
         if self.mass_kg is not None and self.mass_kg.high > LARGEST_KG:
             raise ValueError(f"mass_kg of {self.mass_kg.high:g} kg, which is impossible")
         if self.longest_side_m is not None and self.longest_side_m.high > LARGEST_M:
@@ -119,7 +119,7 @@ class Review(Record):
     origin: Literal["browser", "file"] = "browser"
 
     @model_validator(mode="after")
-    def _says_something(self) -> Review:
+    def _require_content(self) -> Review:
         if not self.answers:
             raise ValueError(f"no dimension is answered; answer one of {', '.join(DIMENSIONS)}")
         for dimension in DIMENSIONS:

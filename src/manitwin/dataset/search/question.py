@@ -7,7 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.diacritics import without_diacritics
+from manitwin.models.annotators.diacritics import remove_diacritics
 
 IGNORED = frozenset(
     (
@@ -77,7 +77,7 @@ def words(text: str) -> list[str]:
 
 
 def _all_words(text: str) -> list[str]:
-    found = (word.casefold() for word in _WORD.findall(without_diacritics(text)))
+    found = (word.casefold() for word in _WORD.findall(remove_diacritics(text)))
     return [word if word in IGNORED else _singular(SPELLINGS.get(word, word)) for word in found]
 
 

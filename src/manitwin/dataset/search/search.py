@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from manitwin.dataset.index.query import Index
-from manitwin.dataset.search.stored import Stored, VectorStore
-from manitwin.dataset.search.words import described, rank_by_words, unknown_words
+from manitwin.dataset.search.vector_store import StoredVectors, VectorStore
+from manitwin.dataset.search.words import rank_by_words, text_fields, unknown_words
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import sha256_of_json
@@ -63,20 +63,20 @@ def search_words(root: DatasetRoot, question: str, *, limit: int, embedder: Text
     rankings are fused. Raises UsageError without an index or words.
     """
     rows = _rows(root)
-    by_words = rank_by_words(question, [described(row) for row in rows], [row["longest_m"] for row in rows])
+    by_words = rank_by_words(question, [text_fields(row) for row in rows], [row["longest_m"] for row in rows])
     scores, matched = {hit.place: hit.score for hit in by_words}, {hit.place: hit.matched for hit in by_words}
     if embedder is not None and rows:
         asked = embedder.embed([question])[0]
         likeness = text_vectors(root, rows, embedder) @ asked
         nearest = np.argsort(-likeness, kind="stable").tolist()
-        scores = _joined_ranks([hit.place for hit in by_words], nearest)
+        scores = _fuse_ranks([hit.place for hit in by_words], nearest)
     order = sorted(scores, key=lambda place: (-scores[place], place))[:limit]
     return [_hit(rows[place], scores[place], matched.get(place)) for place in order]
 
 
-def words_of_no_twin(root: DatasetRoot, question: str) -> dict[str, list[str]]:
+def find_unknown_words(root: DatasetRoot, question: str) -> dict[str, list[str]]:
     """Return the question words that occur in no twin of a data set, each with similarly spelt words that do."""
-    return unknown_words(question, [described(row) for row in _rows(root)])
+    return unknown_words(question, [text_fields(row) for row in _rows(root)])
 
 
 def search_picture(
@@ -90,23 +90,23 @@ def search_picture(
 
     Raises UsageError without an index, for a data set at a URL, and for a picture without a foreground.
     """
-    from manitwin.dataset.search.twin_looks import twin_looks
+    from manitwin.dataset.search.appearance_vectors import load_appearance_vectors
+    from manitwin.models.embedders.appearance import appearance_descriptor
     from manitwin.models.embedders.foreground import foreground
-    from manitwin.models.embedders.looks import look_of
 
     rows = _rows(root)
     rgb, mask, found = foreground(pixels)
     try:
-        look = look_of(rgb, mask)
+        look = appearance_descriptor(rgb, mask)
     except ValueError as error:
         raise UsageError(f"the picture shows no object ({error}); give a larger crop of one object") from error
-    looks = dict(twin_looks(root, {row["twin_id"]: row["revision"] for row in rows}, on_twin))
-    scores = [likeness(look, looks[row["twin_id"]]) for row in rows]
+    looks = dict(load_appearance_vectors(root, {row["twin_id"]: row["revision"] for row in rows}, on_twin))
+    scores = [view_similarity(look, looks[row["twin_id"]]) for row in rows]
     order = np.argsort(-np.array(scores), kind="stable").tolist()[:limit]
     return [_hit(rows[place], scores[place], None) for place in order], found
 
 
-def likeness(look: np.ndarray, views: np.ndarray) -> float:
+def view_similarity(look: np.ndarray, views: np.ndarray) -> float:
     """Return the mean of the three largest dot products of a feature vector ``(D,)`` with those of a twin's views ``(V, D)``."""
     return float(np.sort(views.astype(np.float64) @ look.astype(np.float64))[-BEST_VIEWS:].mean())
 
@@ -123,7 +123,9 @@ def text_vectors(root: DatasetRoot, rows: Sequence[dict[str, Any]], embedder: Te
         if each is None or each.content != digests[place] or len(each.vectors) != 1
     ]
     for place, vector in zip(missing, embedder.embed([texts[place] for place in missing]), strict=True):
-        kept[place] = store.write(rows[place]["twin_id"], Stored(rows[place]["revision"], digests[place], vector[None]))
+        kept[place] = store.write(
+            rows[place]["twin_id"], StoredVectors(rows[place]["revision"], digests[place], vector[None])
+        )
     vectors = [each.vectors[0] for each in kept if each is not None]
     if len({len(vector) for vector in vectors}) > 1:
         raise UsageError(
@@ -132,7 +134,7 @@ def text_vectors(root: DatasetRoot, rows: Sequence[dict[str, Any]], embedder: Te
     return np.array(vectors)
 
 
-def _joined_ranks(*orders: list[int]) -> dict[int, float]:
+def _fuse_ranks(*orders: list[int]) -> dict[int, float]:
     scores: dict[int, float] = {}
     for order in orders:
         for rank, place in enumerate(order, 1):

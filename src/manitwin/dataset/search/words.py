@@ -11,8 +11,8 @@ from difflib import get_close_matches
 from itertools import chain, pairwise
 
 from manitwin.dataset.search.question import Question, words
-from manitwin.models.annotators.prior_names import lookup
-from manitwin.models.annotators.words import is_metal
+from manitwin.models.annotators.descriptions import is_metal
+from manitwin.models.annotators.prior_names import find_prior
 
 WEIGHTS = {
     "category": 6.0,
@@ -57,7 +57,7 @@ class WordHit:
     matched: dict[str, list[str]]
 
 
-def described(row: Mapping[str, object]) -> dict[str, str]:
+def text_fields(row: Mapping[str, object]) -> dict[str, str]:
     """Return the texts by field of a row of the index table ``twins``; the aliases are those of the category's prior.
 
     Colour words are removed from the aliases: the alias "red apple" does not mean that this twin is red.
@@ -66,7 +66,7 @@ def described(row: Mapping[str, object]) -> dict[str, str]:
     texts["color"] = _NOT_A_COLOR.sub(" ", texts["color"])
     if any(is_metal(each) for each in re.split(r", | and | or | with ", texts["material"]) if each):
         texts["material"] += " metal"
-    prior = lookup(texts["category"])
+    prior = find_prior(texts["category"])
     names = " ".join((prior.category, *prior.aliases)) if prior else ""
     texts["aliases"] = " ".join(word for word in names.split() if word not in _COLORS)
     texts["kind"] = KINDS.get(prior.domain, "") if prior else ""
@@ -84,7 +84,7 @@ def rank_by_words(
     """
     counted = [{field: Counter(words(text)) for field, text in each.items()} for each in texts]
     asked = Question.of(
-        question, {word for each in counted for field in each.values() for word in field}, _pairs(texts)
+        question, {word for each in counted for field in each.values() for word in field}, _adjacent_words(texts)
     )
     lengths = {field: _mean(sum(each[field].values()) for each in counted) or 1.0 for field in WEIGHTS}
     forms = set(chain.from_iterable(asked.wanted.values()))
@@ -109,7 +109,7 @@ def rank_by_words(
         if matched:
             hits.append(WordHit(place, score, matched))
     if asked.larger_first is not None and longest_m is not None:
-        hits = _by_size(hits, [each["category"] for each in texts], longest_m, asked.larger_first)
+        hits = _boost_by_size(hits, [each["category"] for each in texts], longest_m, asked.larger_first)
     return sorted(hits, key=lambda hit: (-hit.score, hit.place))
 
 
@@ -119,12 +119,12 @@ def unknown_words(question: str, texts: list[dict[str, str]]) -> dict[str, list[
     Raises UsageError for a question without words.
     """
     vocabulary = {word for each in texts for text in each.values() for word in words(text)}
-    asked = Question.of(question, vocabulary, _pairs(texts))
+    asked = Question.of(question, vocabulary, _adjacent_words(texts))
     unknown = [word for word, forms in asked.wanted.items() if vocabulary.isdisjoint(forms)]
     return {word: get_close_matches(word, sorted(vocabulary), MOST_NEAR, NEARLY) for word in unknown}
 
 
-def _by_size(
+def _boost_by_size(
     hits: list[WordHit], categories: list[str], longest_m: Sequence[float], larger_first: bool
 ) -> list[WordHit]:
     """Increase the scores of hits by the share of hits of their category that they are larger (smaller) than."""
@@ -137,7 +137,7 @@ def _by_size(
     return weighed
 
 
-def _pairs(texts: list[dict[str, str]]) -> dict[str, tuple[str, str]]:
+def _adjacent_words(texts: list[dict[str, str]]) -> dict[str, tuple[str, str]]:
     """Return the adjacent words in categories and names, keyed by both words joined."""
     named = (words(each[field]) for each in texts for field in ("category", "name"))
     return {"".join(pair): pair for found in named for pair in pairwise(found)}

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from manitwin.dataset.index.conditions import sql_text
 from manitwin.dataset.statistics.query import Column, Query, counts, histogram, labels, summary
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.prior_records import Prior
 
 ATTRIBUTES = ("category", "color", "material", "size", "shape", "function")
@@ -140,7 +140,7 @@ FROM twins WHERE longest_m > 0 AND mass_kg > 0 ORDER BY md5(twin_id || ':{SAMPLE
 
 def priors_of(categories: Iterable[str]) -> dict[str, Prior]:
     """Return the priors of those categories that have one."""
-    found = {category: lookup(category) for category in categories}
+    found = {category: find_prior(category) for category in categories}
     return {category: prior for category, prior in found.items() if prior is not None}
 
 

@@ -9,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 
 from manitwin.dataset.statistics.query import Column, Query, Result, Row
-from manitwin.dataset.statistics.style import Figure, for_page
+from manitwin.dataset.statistics.style import Figure, themed_svg
 from manitwin.formats.markdown import one_line
 from manitwin.twin.store import canonical_json, write_bytes_atomically
 
@@ -184,7 +184,7 @@ class _Page:
         queries = (self.report.results[name].query for name in figure.queries)
         sql = "".join(_sql(query) for query in queries if not query.columns)  # a table shows its own SQL
         return (
-            f'<figure id="figure-{figure.name}">\n{for_page(figure.svg)}\n'
+            f'<figure id="figure-{figure.name}">\n{themed_svg(figure.svg)}\n'
             f"<figcaption><b>Figure {self.figures}.</b> {escape(figure.caption)}</figcaption>\n{sql}</figure>\n"
         )
 
@@ -197,11 +197,11 @@ def _sql(query: Query) -> str:
 
 def _cells(columns: Sequence[Column], row: Row) -> list[str]:
     first = columns[0]
-    head = f'<th scope="row" class="{first.kind}">{written(first, row)}</th>'
-    return [head, *(f'<td class="{column.kind}">{written(column, row)}</td>' for column in columns[1:])]
+    head = f'<th scope="row" class="{first.kind}">{html_cell(first, row)}</th>'
+    return [head, *(f'<td class="{column.kind}">{html_cell(column, row)}</td>' for column in columns[1:])]
 
 
-def written(column: Column, row: Row) -> str:
+def html_cell(column: Column, row: Row) -> str:
     """Return the content of a cell as HTML."""
     value = row[column.name]
     if value is None:

@@ -11,7 +11,7 @@ import pyarrow as pa
 from fsspec import AbstractFileSystem
 
 from manitwin.dataset.index.conditions import sql_texts
-from manitwin.dataset.index.part_list import remedy_of, require_files
+from manitwin.dataset.index.part_list import repair_command, require_files
 from manitwin.dataset.index.query import Index, location
 from manitwin.dataset.index.tables import TABLES
 from manitwin.errors import UsageError
@@ -168,7 +168,7 @@ class ReportTables:
         for name, schema in TABLES.items():
             files = [location(root, part.file(name)) for part in parts if part.rows[name]]
             tables[name] = f"read_parquet([{sql_texts(files)}])" if files else schema.empty_table()
-        return cls(tables, file_system=None if root.local is not None else root.fs, remedy=remedy_of(root))
+        return cls(tables, file_system=None if root.local is not None else root.fs, remedy=repair_command(root))
 
     def result(self, query: Query) -> Result:
         """Run a query. Floats are rounded to 12 digits, so that they do not depend on the distribution of rows over files.

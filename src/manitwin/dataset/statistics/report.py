@@ -15,7 +15,7 @@ from manitwin.dataset.statistics import stage_queries as stages
 from manitwin.dataset.statistics.figures import bars, histograms, masses, words
 from manitwin.dataset.statistics.page import FOLDER, REPORT, NearPairs, Report, ReportSection, report_section
 from manitwin.dataset.statistics.query import PRELUDE, Query, ReportTables, Result
-from manitwin.dataset.statistics.style import Figure, drawing
+from manitwin.dataset.statistics.style import Figure, report_style
 from manitwin.twin.dataset_root import DatasetRoot
 
 MOST_PAIRS = 1000
@@ -67,7 +67,7 @@ def write_dataset_report(root: DatasetRoot, out: Path | None = None) -> WrittenR
     return WrittenReport(str(folder / REPORT), write_report(tables, folder, title=title, duplicates=duplicates))
 
 
-def collect(tables: ReportTables) -> dict[str, Result]:
+def run_queries(tables: ReportTables) -> dict[str, Result]:
     """Return the result of every query by its name."""
     results = {query.name: tables.result(query) for query in QUERIES}
     found = objects.priors_of(row["category"] for row in results["categories"].rows)
@@ -77,17 +77,17 @@ def collect(tables: ReportTables) -> dict[str, Result]:
 
 def write_report(tables: ReportTables, out: Path, *, title: str, duplicates: NearDuplicates | None = None) -> str:
     """Write the report of tables to a folder; return the page's first sentence. Equal tables give equal bytes."""
-    results = collect(tables)
+    results = run_queries(tables)
     near = None if duplicates is None else _near_pairs(duplicates)
-    with drawing():
-        figures = draw(results)
+    with report_style():
+        figures = draw_figures(results)
     lead = _lead(results)
-    report = Report(title, lead, PRELUDE, VIEWS, results, figures, sections(results, figures, near))
+    report = Report(title, lead, PRELUDE, VIEWS, results, figures, report_sections(results, figures, near))
     report.write(out, near_duplicates=None if near is None else vars(near))
     return lead[0].rstrip(".")
 
 
-def draw(results: dict[str, Result]) -> dict[str, Figure | None]:
+def draw_figures(results: dict[str, Result]) -> dict[str, Figure | None]:
     """Return all figures by name, None if there is nothing to draw."""
     of = results.__getitem__
     of_size, of_mass = ((of(name), of("dimensions")) for name in ("size_histogram", "mass_histogram"))
@@ -116,7 +116,7 @@ def draw(results: dict[str, Result]) -> dict[str, Figure | None]:
     return {**figures, **clouds}
 
 
-def sections(
+def report_sections(
     results: dict[str, Result], figures: dict[str, Figure | None], near: NearPairs | None
 ) -> list[ReportSection]:
     """Return the report's sections with their tables and figures in order."""

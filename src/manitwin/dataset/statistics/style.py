@@ -81,7 +81,7 @@ class Figure:
 
 
 @contextmanager
-def drawing() -> Iterator[None]:
+def report_style() -> Iterator[None]:
     """Apply the report's style, independent of the user's matplotlib settings."""
     with matplotlib.rc_context(), warnings.catch_warnings():
         matplotlib.rcdefaults()
@@ -107,7 +107,7 @@ def row_canvas(labels: Sequence[str], row_in: float = 0.22, frame_in: float = 0.
     return figure, axis
 
 
-def finished(figure: Canvas | str, name: str, caption: str, alt: str, *results: Result) -> Figure:
+def export_figure(figure: Canvas | str, name: str, caption: str, alt: str, *results: Result) -> Figure:
     """Return a figure of results from a drawn canvas or SVG, without XML prologue and dates.
 
     Ids are made unique, the report's font is set, and a text description is added.
@@ -119,7 +119,7 @@ def finished(figure: Canvas | str, name: str, caption: str, alt: str, *results: 
         tag = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", tag)
         return tag.replace("'DejaVu Sans'", FONT)
 
-    body = _in_tags(body, own)
+    body = _map_tags(body, own)
     opening = body.index(">") + 1
     svg = (
         f'<svg role="img" aria-labelledby="{name}-title {name}-description" {body[len("<svg ") : opening]}\n'
@@ -135,7 +135,7 @@ def _svg(figure: Canvas) -> str:
     return stream.getvalue()
 
 
-def for_page(svg: str) -> str:
+def themed_svg(svg: str) -> str:
     """Return SVG with its colours replaced by the page's CSS variables."""
 
     def variables(tag: str) -> str:
@@ -143,10 +143,10 @@ def for_page(svg: str) -> str:
             tag = tag.replace(f": {color}", f": var(--{name})")
         return tag
 
-    return _in_tags(svg, variables)
+    return _map_tags(svg, variables)
 
 
-def _in_tags(svg: str, change: Callable[[str], str]) -> str:
+def _map_tags(svg: str, change: Callable[[str], str]) -> str:
     """Apply ``change`` to the tags only; the text between them is data."""
     return re.sub(r"<[a-z][^<>]*>", lambda tag: change(tag[0]), svg)
 
@@ -162,7 +162,7 @@ def plain_number(value: float) -> str:
     return f"{value:,.0f}" if value >= 10 else f"{value:.4g}"
 
 
-def beside_bar(axis: Axes, end: float, row: float, words: str) -> None:
+def label_bar(axis: Axes, end: float, row: float, words: str) -> None:
     """Write a text beside the end of a horizontal bar."""
     axis.annotate(words, (end, row), (3, 0), textcoords="offset points", va="center")
 

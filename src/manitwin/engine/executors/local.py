@@ -21,11 +21,11 @@ from typing import Any
 from pebble import ProcessExpired
 
 from manitwin.config import Resource, RunConfig
-from manitwin.engine.executors.local_worker import LastWords, do, start
-from manitwin.engine.executors.stage_notes import EVERY_S, drop_note, read_notes
+from manitwin.engine.executors.local_worker import CrashReport, initialize_worker, run_job
+from manitwin.engine.executors.stage_progress import EVERY_S, drop_note, read_notes
 from manitwin.engine.interrupts import deferred_interrupts
 from manitwin.engine.jobs import Failure, Job, Reply, RunStage, StageRejected, WorkerSetup
-from manitwin.engine.machine_share import available_workers
+from manitwin.engine.machine_resources import available_workers
 from manitwin.engine.stage import StagePart
 from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.worker import too_large
@@ -41,7 +41,7 @@ FAILED_POOLS = 5  # consecutive pool failures without an answer; the installatio
 
 
 @dataclass
-class _Given:
+class _SubmittedJob:
     """A submitted job, its run time so far, and whether it exceeded the timeout."""
 
     job: Job
@@ -73,7 +73,7 @@ class LocalExecutor:
         }  # fmt: skip
         self._slots = {needs: slots if items is None else max(1, min(slots, items)) for needs, slots in wanted.items()}
         self._pools: dict[Resource, WorkerPool] = {}
-        self._given: dict[int, _Given] = {}
+        self._given: dict[int, _SubmittedJob] = {}
         self._failed_pools = 0
         self._ended: queue.SimpleQueue[tuple[int, Reply]] = queue.SimpleQueue()
         self._stacks = tempfile.TemporaryDirectory(prefix="manitwin-")
@@ -97,7 +97,7 @@ class LocalExecutor:
     def submit(self, ticket: int, job: Job) -> None:
         """Submit a job to the pool of the resource it needs."""
         with deferred_interrupts():
-            given = _Given(job)
+            given = _SubmittedJob(job)
             given.future = self._schedule(ticket, given)
             self._given[ticket] = given
 
@@ -127,19 +127,19 @@ class LocalExecutor:
         with deferred_interrupts():
             atexit.unregister(self.close)
             for pool in self._pools.values():
-                pool.refuse()
+                pool.close_to_new_calls()
             for pool in self._pools.values():
                 pool.stop()
             self._pools.clear()
             self._stacks.cleanup()
             self._main.__exit__(None, None, None)
 
-    def _schedule(self, ticket: int, given: _Given) -> Any:
+    def _schedule(self, ticket: int, given: _SubmittedJob) -> Any:
         """Schedule a job in its pool; replace the pool if all of its processes died before they got a job."""
         while True:
             pool = self._pool(given.job.needs)
             try:
-                return pool.schedule(do, (ticket, given.job), on_end=partial(self._hand_over, ticket, given))
+                return pool.schedule(run_job, (ticket, given.job), on_end=partial(self._queue_reply, ticket, given))
             except RuntimeError as error:  # raised by pebble for a broken pool
                 self._failed_pools += 1
                 if self._failed_pools >= FAILED_POOLS:
@@ -169,23 +169,23 @@ class LocalExecutor:
             self._pools[needs] = WorkerPool(
                 self._slots[needs],
                 max_tasks=JOBS_A_PROCESS,
-                initializer=start,
+                initializer=initialize_worker,
                 initargs=(self._setup, self._stacks.name, os.getpid()),
             )
         return self._pools[needs]
 
-    def _hand_over(self, ticket: int, given: _Given, future: Any) -> None:
+    def _queue_reply(self, ticket: int, given: _SubmittedJob, future: Any) -> None:
         drop_note(Path(self._stacks.name), ticket)  # left by a worker that died or was killed on timeout
         self._ended.put((ticket, self._reply(given, future)))
 
-    def _reply(self, given: _Given, future: Any) -> Reply:
+    def _reply(self, given: _SubmittedJob, future: Any) -> Reply:
         try:
             reply: Reply = future.result()
             self._failed_pools = 0
             return reply
         except ProcessExpired as error:
             self._failed_pools = 0  # the process had started a job, so the pool works
-            return self._died(given.job, error)
+            return self._death_reply(given.job, error)
         except CancelledError:
             if not given.late:
                 return Failure("died", "interrupted because the run was stopped")
@@ -196,12 +196,12 @@ class LocalExecutor:
         except Exception as error:  # e.g. a reply that cannot be pickled; the other jobs continue
             return Failure("error", " ".join(f"{type(error).__name__}: {error}".split()))
 
-    def _died(self, job: Job, error: ProcessExpired) -> Reply:
+    def _death_reply(self, job: Job, error: ProcessExpired) -> Reply:
         """Describe in one line how a process died; reject the item as too large if it ran out of memory."""
-        words = LastWords.read(Path(self._stacks.name), error.pid)
+        words = CrashReport.from_stack_file(Path(self._stacks.name), error.pid)
         if words.no_memory and isinstance(job, RunStage) and self._setup.recipe.can_reject:
             return StageRejected(too_large(job, self._setup.memory_gb), StageCost(0.0, 0.0, 0.0))
-        how = _how(error.exitcode)
+        how = _exit_description(error.exitcode)
         said = f": {words.said}" if words.said else ""
         at = f"; it was at {words.calls}" if words.calls else ""
         limit = self._setup.memory_gb
@@ -211,7 +211,7 @@ class LocalExecutor:
         return Failure("died", f"the worker process died ({how}{said}){memory}{at}")
 
 
-def _how(exit_code: int | None) -> str:
+def _exit_description(exit_code: int | None) -> str:
     if exit_code is not None and exit_code < 0:
         return signal.Signals(-exit_code).name
     return f"exit code {exit_code}"

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
-from manitwin.engine.executors.stage_notes import parts_noted
+from manitwin.engine.executors.stage_progress import write_progress_notes
 from manitwin.engine.fork_server import parent_of_workers
 from manitwin.engine.jobs import Job, Reply, RunStage, WorkerSetup
-from manitwin.engine.process_bounds import die_with, limit_memory
+from manitwin.engine.process_limits import limit_memory, set_parent_death_signal
 from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import keep_imported, map_large_blocks, return_free_memory
+from manitwin.engine.worker_processes import freeze_garbage_collector, map_large_blocks, return_free_memory
 from manitwin.formats.printable import printable_line
 
 STACK_LINES = 12
@@ -28,10 +28,10 @@ _worker: Worker | None = None
 _stack_file: TextIO | None = None
 
 
-def start(setup: WorkerSetup, stacks: str, driver: int) -> None:
+def initialize_worker(setup: WorkerSetup, stacks: str, driver: int) -> None:
     """Initialize this worker process: link its life to the driver's, restore SIGTERM, capture stderr, and limit memory."""
     global _worker, _stack_file
-    die_with(parent_of_workers(driver))
+    set_parent_death_signal(parent_of_workers(driver))
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's handler would wait for native code to return
     _stack_file = (Path(stacks) / f"{os.getpid()}.txt").open("a")
     faulthandler.enable(_stack_file)
@@ -41,24 +41,24 @@ def start(setup: WorkerSetup, stacks: str, driver: int) -> None:
     limit_memory(setup.memory_gb)
     _worker = Worker(setup)
     map_large_blocks()
-    keep_imported()
+    freeze_garbage_collector()
 
 
-def do(ticket: int, job: Job) -> Reply:
+def run_job(ticket: int, job: Job) -> Reply:
     """Run a job and return its reply."""
     assert _worker is not None and _stack_file is not None
     os.ftruncate(_stack_file.fileno(), 0)  # discard output of earlier jobs
     if not isinstance(job, RunStage):
         return _worker.do(job)
     try:
-        with parts_noted(Path(_stack_file.name).parent, ticket):
+        with write_progress_notes(Path(_stack_file.name).parent, ticket):
             return _worker.do(job)
     finally:
         return_free_memory()
 
 
 @dataclass(frozen=True)
-class LastWords:
+class CrashReport:
     """What a dead process left: the last line of native code, its innermost calls, and whether an allocation failed."""
 
     said: str = ""
@@ -66,7 +66,7 @@ class LastWords:
     no_memory: bool = False
 
     @classmethod
-    def read(cls, stacks: Path, pid: int | None) -> LastWords:
+    def from_stack_file(cls, stacks: Path, pid: int | None) -> CrashReport:
         """Read the file that a process left in the stack folder; empty if the process was killed without writing anything."""
         path = stacks / f"{pid}.txt"
         if not path.is_file():

@@ -18,7 +18,7 @@ from manitwin.config import Resource, RunConfig
 from manitwin.engine.executors.ray_pool import Actor, RayPool, Running
 from manitwin.engine.executors.ray_worker import RayWorker
 from manitwin.engine.jobs import Failure, Job, Reply, WorkerSetup
-from manitwin.engine.machine_share import available_cores
+from manitwin.engine.machine_resources import available_cores
 from manitwin.engine.stage import StagePart
 from manitwin.errors import Unavailable, UsageError
 from manitwin.formats.installation import installed_version
@@ -70,7 +70,7 @@ class RayExecutor:
         self._pools: dict[tuple[Resource, bool], RayPool] = {}
         self._nodes_lost: Counter[tuple[Any, ...]] = Counter()
         self._looked_at = 0.0
-        self._head = Head()
+        self._head = HeadMonitor()
 
     def __enter__(self) -> RayExecutor:
         return self
@@ -107,11 +107,11 @@ class RayExecutor:
             left_s = 0.0 if ended else max(0.0, until - time.monotonic())
             for ref in self._ready(left_s):
                 for pool in list(self._pools.values()):
-                    ended += pool.settle(ref)
+                    ended += pool.process_ready_ref(ref)
             if time.monotonic() - self._looked_at > OVERDUE_EVERY_S:
                 self._looked_at = time.monotonic()
                 for pool in list(self._pools.values()):
-                    ended += pool.overdue()
+                    ended += pool.end_overdue_jobs()
             for (needs, alone), pool in self._pools.items():
                 pool.dispatch(1 if alone else self.slots(needs))
             if ended or time.monotonic() >= until:
@@ -124,7 +124,7 @@ class RayExecutor:
     def close(self) -> None:
         """Stop the workers and disconnect; stop the cluster if it was started here."""
         self._head.close()
-        if self._head.silent_s < 5.0:  # a lost head cannot be told; the workers end with the connection
+        if self._head.seconds_since_answer < 5.0:  # a lost head cannot be told; the workers end with the connection
             for pool in self._pools.values():
                 pool.close()
         self._pools.clear()
@@ -136,7 +136,7 @@ class RayExecutor:
     def _connect(self, address: str | None) -> None:
         quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
         if address is not None:
-            self._ray.init(address=reachable(address), **quiet)
+            self._ray.init(address=check_head_address(address), **quiet)
         else:
             self._temporary = Path(tempfile.mkdtemp(prefix="mt-", dir="/tmp"))  # a socket path has at most 107 bytes
             self._ray.init(
@@ -169,12 +169,12 @@ class RayExecutor:
                 threads,
                 lambda: make.remote(self._setup, self._version),
                 self._head.has_lost,
-                self._blame,
+                self._reply_after_death,
                 self._settings.stage_timeout_s,
             )
         return self._pools[needs, alone]
 
-    def _blame(self, running: Running, actor: Actor, together: int) -> Reply:
+    def _reply_after_death(self, running: Running, actor: Actor, together: int) -> Reply:
         """Return the reply for a job whose worker or node died; None if the job is submitted again to a worker of its own."""
         job, cause = running.job, actor.cause
         if actor.death == "unreachable":
@@ -201,7 +201,7 @@ def _import_ray() -> ModuleType:
     return ray
 
 
-def reachable(address: str) -> str:
+def check_head_address(address: str) -> str:
     """Return the ``host:port`` of a cluster's head after checking that it accepts connections: Ray retries a dead one for
     minutes.
 
@@ -226,7 +226,7 @@ def reachable(address: str) -> str:
     return address
 
 
-class Head:
+class HeadMonitor:
     """The latest node list reported by the cluster's head.
 
     Owns a thread that polls the head. A call to a lost head never returns, so that only this thread calls it.
@@ -236,21 +236,21 @@ class Head:
         self._totals: dict[str, float] = {}
         self._dead: frozenset[str] = frozenset()
         self._error = "it does not answer"
-        self._ask()
+        self._poll()
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._keep_asking, name="manitwin-ray-head", daemon=True)
+        self._thread = threading.Thread(target=self._poll_until_stopped, name="manitwin-ray-head", daemon=True)
         self._thread.start()
 
     @property
-    def silent_s(self) -> float:
+    def seconds_since_answer(self) -> float:
         """Seconds since the head last answered."""
         return time.monotonic() - self._heard_at
 
     def check(self) -> None:
         """Raise Unavailable if the head is lost."""
-        if self.silent_s > SILENCE_S:
+        if self.seconds_since_answer > SILENCE_S:
             raise Unavailable(
-                f"the head of the Ray cluster is lost ({self._error} since {self.silent_s:.0f} s); "
+                f"the head of the Ray cluster is lost ({self._error} since {self.seconds_since_answer:.0f} s); "
                 "restart the cluster, then rerun the same command to resume"
             )
 
@@ -267,14 +267,14 @@ class Head:
         self._stop.set()
         self._thread.join(2 * ASK_EVERY_S)  # a thread that hangs in a call to a lost head ends with the process
 
-    def _keep_asking(self) -> None:
+    def _poll_until_stopped(self) -> None:
         while not self._stop.wait(ASK_EVERY_S):
             try:
-                self._ask()
+                self._poll()
             except Exception as error:  # any error counts as no answer; ``check`` raises once it has lasted
                 self._error = " ".join(f"{type(error).__name__}: {error}".split())
 
-    def _ask(self) -> None:
+    def _poll(self) -> None:
         import ray
 
         nodes = ray.nodes()

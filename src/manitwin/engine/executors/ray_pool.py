@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from manitwin.engine.executors.ray_worker import last_words
+from manitwin.engine.executors.ray_worker import read_crash_report
 from manitwin.engine.jobs import Failure, Job, Reply
 from manitwin.errors import Unavailable
 
@@ -103,7 +103,7 @@ class RayPool:
             self._of[actor.handle.where.remote()] = actor
             coming, workers = coming + self._threads, workers + 1
 
-    def settle(self, ref: Any) -> Ended:
+    def process_ready_ref(self, ref: Any) -> Ended:
         """Process an object reference that is ready; return the jobs that ended with it."""
         import ray
 
@@ -112,65 +112,65 @@ class RayPool:
             return []
         if ref in self._inquests:
             self._inquests.discard(ref)
-            return self._buried(actor, self._verdict(actor, ref))
+            return self._end_jobs_of_dead_actor(actor, self._cause_of_death(actor, ref))
         try:
             answer = ray.get(ref)
         except ray.exceptions.RayTaskError as error:  # of one job, e.g. an unpicklable reply
             answer = Failure("error", _line(error.cause if error.cause is not None else error))
         except ray.exceptions.RayError as error:
-            return self._died(actor, error)
+            return self._handle_actor_death(actor, error)
         if ref not in actor.jobs:
             actor.node, actor.stack = answer
             self._failed_starts = 0
             return []
         return self._done(actor, ref, answer)
 
-    def overdue(self) -> Ended:
+    def end_overdue_jobs(self) -> Ended:
         """End jobs that exceed the timeout, bury workers on dead nodes, and end the backlog if no worker starts in time."""
         now, ended = time.monotonic(), Ended()
         for actor in list(self._actors):
             if actor.node and self._has_lost(actor.node):
                 actor.cause = "its node died"
-                self._forget(actor)
-                ended += self._buried(actor, "node")
+                self._kill_actor(actor)
+                ended += self._end_jobs_of_dead_actor(actor, "node")
                 continue
             for ref, running in list(actor.jobs.items()):
                 if now - running.since > self._timeout_s:
-                    ended.append((running.ticket, self._too_long()))
+                    ended.append((running.ticket, self._timeout_failure()))
                     del actor.jobs[ref], self._of[ref]
                     actor.leaves = True  # one of its threads hangs; the jobs of its other threads may finish
-            self._dismiss(actor)
+            self._stop_if_idle(actor)
         for ref in list(self._inquests):
             if self._has_lost(self._of[ref].node):  # the node can no longer be asked
                 self._inquests.discard(ref)
-                ended += self._buried(self._of.pop(ref), "node")
+                ended += self._end_jobs_of_dead_actor(self._of.pop(ref), "node")
         return ended + self._stalled(now)
 
     def close(self) -> None:
         """Kill all workers."""
         for actor in list(self._actors):
-            self._forget(actor)
+            self._kill_actor(actor)
         self._backlog.clear()
 
     def _done(self, actor: Actor, ref: Any, answer: Reply) -> Ended:
         running = actor.jobs.pop(ref)
         actor.done += 1
         actor.leaves = actor.leaves or actor.done >= JOBS_A_WORKER
-        self._dismiss(actor)
+        self._stop_if_idle(actor)
         return [(running.ticket, answer)]
 
-    def _dismiss(self, actor: Actor) -> None:
+    def _stop_if_idle(self, actor: Actor) -> None:
         if actor.leaves and not actor.jobs and actor in self._actors:
-            self._forget(actor)
+            self._kill_actor(actor)
 
-    def _forget(self, actor: Actor) -> None:
+    def _kill_actor(self, actor: Actor) -> None:
         import ray
 
         ray.kill(actor.handle)
         self._actors.remove(actor)
         self._of = {ref: of for ref, of in self._of.items() if of is not actor}
 
-    def _died(self, actor: Actor, error: Exception) -> Ended:
+    def _handle_actor_death(self, actor: Actor, error: Exception) -> Ended:
         """Collect answers that a dead worker still gave, and ask its node for its last words to tell a worker's death from a
         node's.
         """
@@ -180,16 +180,16 @@ class RayPool:
         for ref in list(actor.jobs):
             try:
                 ended += self._done(actor, ref, ray.get(ref, timeout=0))
-            except ray.exceptions.RayError:  # ``_buried`` decides what becomes of it
+            except ray.exceptions.RayError:  # ``_end_jobs_of_dead_actor`` decides what becomes of it
                 continue
         actor.cause = _cause(error)
         actor.death = "unreachable" if isinstance(error, ray.exceptions.ActorUnavailableError) else "worker"
         if actor in self._actors:
-            self._forget(actor)
+            self._kill_actor(actor)
         if not actor.node:
             return ended + self._failed_start(actor)
         on_its_node: Any = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(actor.node, soft=False)
-        ask = ray.remote(num_cpus=0, max_retries=0, scheduling_strategy=on_its_node)(last_words)
+        ask = ray.remote(num_cpus=0, max_retries=0, scheduling_strategy=on_its_node)(read_crash_report)
         ref = ask.remote(actor.stack)
         self._of[ref] = actor
         self._inquests.add(ref)
@@ -204,7 +204,7 @@ class RayPool:
             )
         return []
 
-    def _verdict(self, actor: Actor, ref: Any) -> Death:
+    def _cause_of_death(self, actor: Actor, ref: Any) -> Death:
         import ray
 
         try:
@@ -219,7 +219,7 @@ class RayPool:
             return "worker"
         return actor.death
 
-    def _buried(self, actor: Actor, death: Death) -> Ended:
+    def _end_jobs_of_dead_actor(self, actor: Actor, death: Death) -> Ended:
         actor.death = death
         ended, together = Ended(), len(actor.jobs)
         for running in actor.jobs.values():
@@ -229,7 +229,7 @@ class RayPool:
         actor.jobs.clear()
         return ended
 
-    def _too_long(self) -> Failure:
+    def _timeout_failure(self) -> Failure:
         return Failure("timeout", f"took longer than run.stage_timeout_s = {self._timeout_s:g} s")
 
     def _stalled(self, now: float) -> Ended:

@@ -10,9 +10,9 @@ import time
 from pathlib import Path
 
 from manitwin.engine.jobs import Job, Reply, WorkerSetup
-from manitwin.engine.process_bounds import limit_memory, one_thread_each
+from manitwin.engine.process_limits import limit_library_threads, limit_memory
 from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import keep_imported, map_large_blocks, return_free_memory
+from manitwin.engine.worker_processes import freeze_garbage_collector, map_large_blocks, return_free_memory
 from manitwin.errors import UsageError
 from manitwin.formats.installation import installed_version
 
@@ -34,10 +34,10 @@ class RayWorker:
                 f"this node has manitwin {here}, but the driver has {wanted_version}; install the same"
                 f" version on all nodes"
             )
-        one_thread_each()
+        limit_library_threads()
         limit_memory(setup.memory_gb)
         map_large_blocks()
-        keep_imported()
+        freeze_garbage_collector()
         self._setup = setup
         self._idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
         self._stack = _stack_folder() / f"{os.getpid()}.txt"
@@ -63,7 +63,7 @@ class RayWorker:
             return_free_memory()
 
 
-def last_words(path: str) -> str:
+def read_crash_report(path: str) -> str:
     """Return the signal and innermost calls that a dead worker on this node left; empty if it was killed without writing
     anything.
     """

@@ -10,10 +10,10 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from manitwin.engine.ledger.integrity import check_integrity, convert_sqlite_errors, require_regular
 from manitwin.engine.ledger.lock import hold_lock, lock_file
 from manitwin.engine.ledger.migrations import migrate
 from manitwin.engine.ledger.rows import ItemState, OpenItem, StageState
-from manitwin.engine.ledger.soundness import check_whole, require_regular, sound
 from manitwin.engine.task import Payload
 from manitwin.errors import BackendError, UsageError
 from manitwin.formats.json_file import parse_json_object
@@ -37,7 +37,7 @@ class Ledger:
         self.path = path
         self._lock = hold_lock(path)
         try:
-            with sound(path):
+            with convert_sqlite_errors(path):
                 require_regular(path)
                 self._new = not path.exists()
                 self.connection = sqlite3.connect(path, isolation_level=None)
@@ -53,7 +53,7 @@ class Ledger:
             # a power cut may lose the last rows; their results are found again
             self.connection.execute("PRAGMA synchronous = NORMAL")
             migrate(self.connection, str(self.path))
-            check_whole(self.connection, self.path)
+            check_integrity(self.connection, self.path)
             self.connection.execute("BEGIN")
         except BaseException:
             self.connection.close()
@@ -111,7 +111,7 @@ class Ledger:
     def _number_of(self, text: tuple[str]) -> int:
         return int(self.connection.execute("SELECT number FROM items WHERE item = ?", text).fetchone()[0])
 
-    def restate(self, read: Callable[[Mapping[str, Any]], Payload]) -> None:
+    def rewrite_payloads(self, read: Callable[[Mapping[str, Any]], Payload]) -> None:
         """Rewrite payloads of an earlier version in the current form; ``read`` parses both forms.
 
         All payloads of a ledger have the same form, so that only the first is compared.
@@ -137,7 +137,7 @@ class Ledger:
         self.connection.execute(
             "UPDATE stages SET state = 'waiting', attempts = max(attempts - 1, 0) WHERE state = 'running'"
         )
-        self.reopen(self.ended_under_others(recipe_sha256, given, replaces=replaces))
+        self.reopen(self.ended_under_other_recipes(recipe_sha256, given, replaces=replaces))
         return int(run or 0)
 
     def end_run(self, run: int, how: str) -> None:
@@ -262,7 +262,7 @@ class Ledger:
         self.commit()
         return count
 
-    def revised(self, twin_id: str, revision: str) -> None:
+    def record_revision(self, twin_id: str, revision: str) -> None:
         """Record that a finished twin was amended, and mark it for indexing."""
         self.connection.execute(
             "UPDATE items SET revision = ?, indexed = 0 WHERE twin_id = ? AND state = 'accepted'", (revision, twin_id)
@@ -279,9 +279,9 @@ class Ledger:
     def totals(self, recipe_sha256: str, given: Collection[int] = (), *, replaces: bool = True) -> tuple[int, int]:
         """Return the total number of items, and how many are open or would be reopened by ``begin_run``."""
         row = self.connection.execute("SELECT count(*), coalesce(sum(state = 'open'), 0) FROM items").fetchone()
-        return int(row[0]), int(row[1]) + len(self.ended_under_others(recipe_sha256, given, replaces=replaces))
+        return int(row[0]), int(row[1]) + len(self.ended_under_other_recipes(recipe_sha256, given, replaces=replaces))
 
-    def ended_under_others(
+    def ended_under_other_recipes(
         self, recipe_sha256: str, given: Collection[int] = (), *, replaces: bool = True
     ) -> list[int]:
         """Return the numbers of items that ended under another recipe: among the given ones or all, as in ``begin_run``."""
@@ -293,7 +293,7 @@ class Ledger:
         wanted = set(given)
         return [number for (number,) in rows if not wanted or number in wanted]
 
-    def ended(self, given: Collection[int] = ()) -> list[tuple[int, str]]:
+    def ended_items(self, given: Collection[int] = ()) -> list[tuple[int, str]]:
         """Return the numbers and twin ids of accepted and rejected items: of the given ones, or of all."""
         rows = self.connection.execute(
             "SELECT number, twin_id FROM items WHERE state IN ('accepted', 'rejected') AND twin_id IS NOT NULL ORDER BY number"
@@ -305,12 +305,12 @@ class Ledger:
         """Return whether any twin is marked as indexed."""
         return self.connection.execute("SELECT 1 FROM items WHERE indexed = 1 LIMIT 1").fetchone() is not None
 
-    def forget_indexed(self) -> None:
+    def clear_indexed(self) -> None:
         """Mark all twins as not indexed."""
         self.connection.execute("UPDATE items SET indexed = 0")
         self.commit()
 
-    def not_indexed(self, count: int) -> list[str]:
+    def unindexed_ids(self, count: int) -> list[str]:
         """Return the ids of up to ``count`` finished twins that are not yet in the tables."""
         rows = self.connection.execute(
             "SELECT twin_id FROM items WHERE indexed = 0 AND state IN ('accepted', 'rejected') AND revision IS NOT NULL"
@@ -319,7 +319,7 @@ class Ledger:
         )
         return [twin_id for (twin_id,) in rows]
 
-    def indexed(self, twin_ids: Iterable[str]) -> None:
+    def mark_indexed(self, twin_ids: Iterable[str]) -> None:
         """Mark twins as indexed."""
         self.connection.executemany("UPDATE items SET indexed = 1 WHERE twin_id = ?", ((i,) for i in twin_ids))
 

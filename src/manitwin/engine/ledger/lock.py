@@ -17,7 +17,7 @@ def lock_file(ledger: Path) -> Path:
     return ledger.with_suffix(".lock")
 
 
-def _opened(path: Path, flags: int) -> TextIO:
+def _open_lock_file(path: Path, flags: int) -> TextIO:
     """Open a lock file. Links, pipes and devices are refused, because opening them could write elsewhere or block."""
     try:
         descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
@@ -35,7 +35,7 @@ def hold_lock(ledger: Path) -> TextIO:
     """Acquire the lock of a ledger and return the open file that holds it. Raises UsageError if another run holds it."""
     path = lock_file(ledger)
     while True:
-        lock = _opened(path, os.O_RDWR | os.O_CREAT)
+        lock = _open_lock_file(path, os.O_RDWR | os.O_CREAT)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
@@ -50,7 +50,7 @@ def hold_lock(ledger: Path) -> TextIO:
 def is_written(ledger: Path) -> bool:
     """Return whether a run is writing a ledger now."""
     try:
-        lock = _opened(lock_file(ledger), os.O_RDONLY)
+        lock = _open_lock_file(lock_file(ledger), os.O_RDONLY)
     except FileNotFoundError:
         return False
     with lock:

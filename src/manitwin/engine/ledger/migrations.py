@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 
 from manitwin.errors import UsageError
-from manitwin.formats.schema_version import is_newer, of_newer_schema
+from manitwin.formats.schema_version import is_newer, newer_schema_message
 
 MIGRATIONS = (
     """
@@ -56,7 +56,7 @@ def schema_of(connection: sqlite3.Connection, path: str) -> int:
     """Return how many migrations a ledger has had. Raises UsageError for a ledger of a newer version of this package."""
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if is_newer(version, len(MIGRATIONS)):
-        raise UsageError(of_newer_schema(path, version, len(MIGRATIONS)))
+        raise UsageError(newer_schema_message(path, version, len(MIGRATIONS)))
     return int(version)
 
 

@@ -103,7 +103,7 @@ def read_progress(
         cost_usd=sum((stage.cost_usd for stage in stages), 0.0),
         cpu_seconds=sum((stage.mean_cpu_seconds * (stage.done + stage.rejected) for stage in stages), 0.0),
         last_run="none" if run is None else run["ended_how"] or ("at work" if at_work else "cut off"),
-        of_another_recipe=0 if run is None else _of_another(connection, run["recipe_sha256"]),
+        of_another_recipe=0 if run is None else _count_other_recipe(connection, run["recipe_sha256"]),
     )
 
 
@@ -123,7 +123,7 @@ def _stages(connection: sqlite3.Connection, place_of: StageOrder) -> list[StageP
     return sorted((StageProgress(**dict(row)) for row in rows), key=place)
 
 
-def _of_another(connection: sqlite3.Connection, recipe_sha256: str) -> int:
+def _count_other_recipe(connection: sqlite3.Connection, recipe_sha256: str) -> int:
     (count,) = connection.execute(
         "SELECT count(*) FROM items WHERE state NOT IN ('open', 'duplicate') AND recipe_sha256 <> ?", (recipe_sha256,)
     ).fetchone()
@@ -163,7 +163,9 @@ def read_story(connection: sqlite3.Connection, which: str) -> ItemStory:
             continue
         rows = connection.execute(f"SELECT {columns} FROM items WHERE {condition} LIMIT 6", (value,)).fetchall()
         if len(rows) > 1:
-            near = "; ".join(f"{row['number']} {row['twin_id'] or ''} {told(json.loads(row['item']))}" for row in rows)
+            near = "; ".join(
+                f"{row['number']} {row['twin_id'] or ''} {describe_payload(json.loads(row['item']))}" for row in rows
+            )
             raise UsageError(f"{which}: matches several items: {near}; give the number or id of one")
         if rows:
             row = rows[0]
@@ -174,7 +176,7 @@ def read_story(connection: sqlite3.Connection, which: str) -> ItemStory:
     raise UsageError(f"{which}: no such item; give an item number, a twin id, or part of a file name")
 
 
-def told(payload: Mapping[str, Any]) -> str:
+def describe_payload(payload: Mapping[str, Any]) -> str:
     """Return a payload as one readable line."""
     return ", ".join(f"{key} {value}" for key, value in payload.items() if value is not None)
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from manitwin.engine.ledger.integrity import check_integrity, convert_sqlite_errors, require_regular
 from manitwin.engine.ledger.lock import is_written
 from manitwin.engine.ledger.migrations import schema_of
-from manitwin.engine.ledger.soundness import check_whole, require_regular, sound
 from manitwin.errors import UsageError
 
 
@@ -33,11 +33,11 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
     connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro{'&immutable=1' if at_rest else ''}", uri=True)
     connection.row_factory = sqlite3.Row
     try:
-        with sound(path):
+        with convert_sqlite_errors(path):
             connection.execute("PRAGMA trusted_schema = OFF")
             # checked first: tables of a newer version are not damage
             schema_of(connection, str(path))
-            check_whole(connection, path)
+            check_integrity(connection, path)
             yield connection
     finally:
         connection.close()

@@ -12,12 +12,12 @@ import numpy as np
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
+from manitwin.episodes.grasp_stability import stable_grasp_tiers
 from manitwin.episodes.outcome import moved_m, turned_rad
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
-from manitwin.episodes.planning.problem import Grasp, Grasped, Motion, Phase, PickPlaceProblem, PlanReport
+from manitwin.episodes.planning.problem import Grasp, GraspingPlan, Motion, Phase, PickPlaceProblem, PlanReport
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.skill import SkillGoal
-from manitwin.episodes.steady_grasps import steady_tiers
 from manitwin.geometry.poses import inverse, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.contacts import NONE_MEANT
@@ -32,7 +32,7 @@ FIRST_SHARE = 0.75  # share of the grasps in the first part, which tend to be go
 LEAST_LIFT_SHARE = 0.5  # of the hand's rise: below this, the object was left behind
 
 
-def first_and_last(grasps: Sequence[_Chosen]) -> tuple[Sequence[_Chosen], Sequence[_Chosen]]:
+def split_by_quality(grasps: Sequence[_Chosen]) -> tuple[Sequence[_Chosen], Sequence[_Chosen]]:
     """Split grasps into the first three quarters and the rest.
 
     Their order is random with a bias towards good grasps (``target_grasps.shuffled``). Callers sort each part separately by
@@ -42,15 +42,15 @@ def first_and_last(grasps: Sequence[_Chosen]) -> tuple[Sequence[_Chosen], Sequen
     return grasps[:count], grasps[count:]
 
 
-class Ended(Exception):
+class EpisodeEnded(Exception):
     """Ends the episode with an outcome."""
 
 
-class NotTaken(Ended):
+class GraspFailed(EpisodeEnded):
     """Ends the episode unless the target, which stands again without the hand, can be taken by another grasp."""
 
 
-class Turned(NotTaken):
+class TurnedInHand(GraspFailed):
     """The target turned in the hand during the lift and has been put back: the same grasp is used if there is no other."""
 
 
@@ -62,7 +62,7 @@ class Planner(Protocol):
         ...
 
     def plan_place(
-        self, problem: PickPlaceProblem, plan: Grasped, joint_positions_rad: np.ndarray,
+        self, problem: PickPlaceProblem, plan: GraspingPlan, joint_positions_rad: np.ndarray,
         gripper_to_object_measured: np.ndarray, goal: np.ndarray, with_carry: bool,
     ) -> tuple[Motion | None, Motion, Motion] | None:  # fmt: skip
         """Plan carry (if ``with_carry``), lower and retreat from the current joints; None if there is no plan."""
@@ -74,7 +74,7 @@ class Planner(Protocol):
 
 
 @dataclass
-class Start:
+class EpisodeStart:
     """Start of an episode: the problem, and all ``objects`` (in the world's order) at their resting poses.
 
     ``granules_in`` maps objects to the number of granules they hold. For a goal of several literals, ``moved`` are the names
@@ -91,12 +91,12 @@ class Start:
     partners: frozenset[str] = frozenset()
 
 
-def tiers_of(start: Start) -> list[tuple[Grasp, ...]]:
+def grasp_tiers(start: EpisodeStart) -> list[tuple[Grasp, ...]]:
     """Return the usable grasps in tiers, first those in which the target can be lifted without turning."""
     problem = start.problem
     if not isinstance(start.planner, PickPlacePlanner):
         return [problem.grasps]
-    return steady_tiers(problem.grasps, problem.target, start.planner.robot.gripper)
+    return stable_grasp_tiers(problem.grasps, problem.target, start.planner.robot.gripper)
 
 
 class Course(ABC):
@@ -107,7 +107,7 @@ class Course(ABC):
 
     lifts_steadily: ClassVar[bool] = False
 
-    def __init__(self, start: Start, facts: EpisodeFacts):
+    def __init__(self, start: EpisodeStart, facts: EpisodeFacts):
         """Take the start of the episode."""
         self.start, self.facts = start, facts
         self.problem = start.problem
@@ -122,12 +122,12 @@ class Course(ABC):
         """Execute the plan; raises Ended if it cannot be completed."""
 
     @property
-    def ends_at(self) -> np.ndarray | None:
+    def planned_end_pose(self) -> np.ndarray | None:
         """Planned final pose ``(4, 4)`` of the target; None if it stays in the hand."""
         return self.goal_object_to_world
 
     @property
-    def putting_back(self) -> Planner:
+    def put_back_planner(self) -> Planner:
         """Planner used to put the target back."""
         return self.start.planner
 
@@ -141,16 +141,16 @@ class Course(ABC):
         Raises NotTaken if the object is left behind, Turned if it turned in the hand and was put back.
         """
         tip_pose = self.start.planner.tip_pose
-        execution.shape(self.facts.grasp)
+        execution.shape_hand(self.facts.grasp)
         execution.follow(reach)
         execution.follow(approach)
-        execution.close()
+        execution.close_hand()
         closed_height_m = self.height_m(execution)
         hand_height_m = tip_pose(execution.commanded_rad)[2, 3]
         self._lift(lift, execution)
         rise_m = tip_pose(execution.commanded_rad)[2, 3] - hand_height_m
         if self.height_m(execution) - closed_height_m < LEAST_LIFT_SHARE * rise_m:
-            raise NotTaken("not_lifted")
+            raise GraspFailed("not_lifted")
 
     def _lift(self, lift: Motion, execution: Execution) -> None:
         """Lift the target. If it turns far in the hand, retrace the lift, release it, and raise Turned.
@@ -169,10 +169,10 @@ class Course(ABC):
         ways_rad = np.linalg.norm(lift.positions_rad - execution.commanded_rad, axis=1)
         been = slice(int(ways_rad.argmin()), None, -1)
         execution.follow(Motion(Phase.LOWER, lift.positions_rad[been], -lift.velocities_rad_s[been]))
-        execution.open()
-        raise Turned("not_lifted")
+        execution.open_hand()
+        raise TurnedInHand("not_lifted")
 
-    def set_down_again(self, plan: Grasped, execution: Execution) -> None:
+    def put_back_if_turned(self, plan: GraspingPlan, execution: Execution) -> None:
         """Put the target back where it was if it has turned so far in the hand that the plan is unusable, and raise NotTaken.
 
         Does nothing if it has turned little, if it cannot be put back, or after a change of grasp.
@@ -184,7 +184,7 @@ class Course(ABC):
             return
         goal = self.problem.target.object_to_world.copy()
         goal[2, 3] += self.start.settings.release_height_m
-        found = self.putting_back.plan_place(
+        found = self.put_back_planner.plan_place(
             self.problem, plan, execution.commanded_rad, execution.gripper_to_object(), goal, True
         )
         if found is None:
@@ -194,19 +194,19 @@ class Course(ABC):
         if carry is not None:
             execution.follow(carry)
         execution.follow(lower)
-        execution.open()
+        execution.open_hand()
         execution.follow(retreat)
-        raise NotTaken("replan_failed")
+        raise GraspFailed("replan_failed")
 
     def tiers(self) -> list[tuple[Grasp, ...]]:
-        """Return the usable grasps (``tiers_of``), and count those rejected because the target's weight would turn it."""
-        self.tell_no_grasp()
-        tiers = tiers_of(self.start)
+        """Return the usable grasps (``grasp_tiers``), and count those rejected because the target's weight would turn it."""
+        self.record_missing_grasp()
+        tiers = grasp_tiers(self.start)
         if turning := len(self.start.problem.grasps) - sum(map(len, tiers)):
             self.facts.plan_failures["weight_not_borne"] += turning
         return tiers
 
-    def tell_no_grasp(self) -> None:
+    def record_missing_grasp(self) -> None:
         """Set the outcome to ``no_grasp`` if the target has no grasp for this hand, to distinguish it from a planning failure."""
         if not self.start.problem.grasps:
             self.facts.outcome = "no_grasp"
@@ -219,9 +219,9 @@ class Course(ABC):
     def check_held(self, execution: Execution) -> None:
         """Raise Ended if the fingers have lost the target."""
         if not min(execution.touches.finger_forces_n) > 0:
-            raise Ended("dropped")
+            raise EpisodeEnded("dropped")
 
-    def measure_slip(self, plan: Grasped, execution: Execution) -> None:
+    def measure_slip(self, plan: GraspingPlan, execution: Execution) -> None:
         """Record how far the target has moved in the hand."""
         planned, measured = inverse(plan.gripper_to_object), inverse(execution.gripper_to_object())
         self.facts.slip_m = moved_m(planned, measured, self.problem.target.body.center_of_mass_m)

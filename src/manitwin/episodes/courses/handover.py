@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.courses.course import Course, Ended, Planner, Start
+from manitwin.episodes.courses.course import Course, EpisodeEnded, EpisodeStart, Planner
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
@@ -16,12 +16,12 @@ from manitwin.episodes.handover_watch import HandoverWatch
 from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.held_path import HeldPathPlanner
 from manitwin.episodes.planning.placement import Placement
+from manitwin.episodes.planning.placement_choice import MOST_PLANNED, PLACES, HeldGrasp, put_down_poses
 from manitwin.episodes.planning.problem import Grasp, Phase
-from manitwin.episodes.planning.put_down import MOST_PLANNED, PLACES, Held, put_down_poses
-from manitwin.episodes.planning.two_arms import HandoverPlan, Take, TwoArmPlanner
+from manitwin.episodes.planning.two_arms import HandoverPlan, TakePlan, TwoArmPlanner
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
-from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
+from manitwin.physics.sapien.contacts import NONE_MEANT, AllowedContacts
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.robots.two_arms import base_to_world
 
@@ -41,13 +41,13 @@ class HandoverCourse(Course):
 
     lifts_steadily = True
 
-    def __init__(self, start: Start, facts: EpisodeFacts):
+    def __init__(self, start: EpisodeStart, facts: EpisodeFacts):
         """Sample meeting places and placements."""
         super().__init__(start, facts)
         assert isinstance(start.planner, TwoArmPlanner), "a handover is planned for two arms"
         self._arms = start.planner
         bases = [base_to_world(planner.robot)[:3, 3] for planner in (self._arms, self._arms.taker)]
-        self._meetings = meetings(self.problem.target, (bases[GIVER] + bases[TAKER]) / 2, self._rng(3))
+        self._meetings = sample_meeting_paths(self.problem.target, (bases[GIVER] + bases[TAKER]) / 2, self._rng(3))
         goals = put_down_poses(
             self.problem.target,
             (self.problem.target.object_to_world, *(() if start.skill_goal is None else start.skill_goal.poses[1:])),
@@ -59,17 +59,20 @@ class HandoverCourse(Course):
             self._rng(9),
         )
         self._giver_is_home = False
-        self._put_down, self._goal = self._arms.put_down(self.problem, goals), start.problem.goal_object_to_world
+        self._put_down, self._goal = (
+            self._arms.placement_choice(self.problem, goals),
+            start.problem.goal_object_to_world,
+        )
 
     @property
-    def ends_at(self) -> np.ndarray | None:
+    def planned_end_pose(self) -> np.ndarray | None:
         """Pose ``(4, 4)`` at which the second arm puts the target down."""
         return self._goal
 
     @property
-    def putting_back(self) -> Planner:
+    def put_back_planner(self) -> Planner:
         """Planner of the first arm alone, with the second one at home."""
-        return self._arms.alone
+        return self._arms.giver_planner
 
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
         """Return the watch of which arm holds the target."""
@@ -83,7 +86,7 @@ class HandoverCourse(Course):
 
     def plan(self) -> bool:
         """Plan both halves with the first feasible pair of grasps and meeting place."""
-        self.tell_no_grasp()
+        self.record_missing_grasp()
         plan, report = self._arms.plan_handover(self.problem, self._meetings, self._put_down, longest_s=LONGEST_S)
         self.facts.grasps_tried += report.tried
         self.facts.plan_failures += report.failures
@@ -91,7 +94,7 @@ class HandoverCourse(Course):
             return False
         self._plan = plan
         self.facts.grasp, self.facts.taker_grasp = plan.give.grasp, plan.take.grasp
-        goal = self._put_down.goal_of(Held(plan.take.grasp, plan.take.gripper_to_object))
+        goal = self._put_down.first_feasible_goal(HeldGrasp(plan.take.grasp, plan.take.gripper_to_object))
         assert goal is not None, "the second grasp was chosen so"
         self._goal = goal
         return True
@@ -102,24 +105,24 @@ class HandoverCourse(Course):
         self._bring(self._plan, execution)
         take = self._take_from(execution, self._plan.take.grasp)
         self.facts.replans["take" if take is not None else "take_failed"] += 1
-        take = take or self._meet_elsewhere(execution)
+        take = take or self._move_to_other_meeting(execution)
         if take is None:
-            self.set_down_again(self._plan.give, execution)
-            raise Ended("replan_failed")
+            self.put_back_if_turned(self._plan.give, execution)
+            raise EpisodeEnded("replan_failed")
         self.facts.taker_grasp = take.grasp
         execution.use(TAKER)
         execution.follow(take.reach)
         execution.follow(take.approach)
-        execution.close()
+        execution.close_hand()
         execution.wait_s(Phase.HOLD, BOTH_HOLD_S)
         execution.use(GIVER)
-        self._let_go(take, execution)
+        self._release_and_withdraw(take, execution)
         execution.use(TAKER)
         execution.wait_s(Phase.HOLD, HOLD_S)
         self.check_held(execution)
         self._set_down(take, execution)
 
-    def _take_from(self, execution: Execution, first: Grasp) -> Take | None:
+    def _take_from(self, execution: Execution, first: Grasp) -> TakePlan | None:
         """Plan how the second arm takes the target from its current pose in the first hand, preferring the grasp ``first``."""
         width_m, there = self._plan.give.grasp.width_m, execution.target_to_world()
         return self._arms.plan_take(
@@ -132,13 +135,13 @@ class HandoverCourse(Course):
             first=(first,),
         )
 
-    def _meet_elsewhere(self, execution: Execution) -> Take | None:
+    def _move_to_other_meeting(self, execution: Execution) -> TakePlan | None:
         """Move the target, as it lies in the first hand now, to another meeting place where the second arm can take it."""
         held, give, measured = HeldPathPlanner(self._arms.parts), self._plan.give, execution.gripper_to_object()
         asked = self._arms.with_taker_at(self.problem, self._arms.taker.arm.home, None)
         for meeting in [each for each in self._meetings if each is not give.held][:OTHER_MEETINGS]:
             here, width_m = execution.commanded_rad, give.grasp.width_m
-            found = held.again(asked, [meeting], measured, here, here, as_hulls=False, longest_s=LONGEST_S)
+            found = held.replan(asked, [meeting], measured, here, here, as_hulls=False, longest_s=LONGEST_S)
             if found is None:
                 continue
             carry, path, joints = found
@@ -147,16 +150,16 @@ class HandoverCourse(Course):
             if take is None:
                 continue
             execution.follow(carry)
-            execution.follow(held.timed(joints, MEET_S, Phase.ACT))
+            execution.follow(held.time_path(joints, MEET_S, Phase.ACT))
             self.check_held(execution)
             take = self._take_from(execution, take.grasp)
             self.facts.replans["elsewhere" if take is not None else "elsewhere_failed"] += 1
             return take
         return None
 
-    def _set_down(self, take: Take, execution: Execution) -> None:
+    def _set_down(self, take: TakePlan, execution: Execution) -> None:
         """Carry the target to the table on the second arm's side, release it and go home; raises Ended if there is no plan."""
-        held = Held(take.grasp, take.gripper_to_object)
+        held = HeldGrasp(take.grasp, take.gripper_to_object)
         placement = self._placement(held, execution) if self._giver_is_home else None
         if placement is None:
             self._bring_home(execution)
@@ -168,7 +171,7 @@ class HandoverCourse(Course):
                 execution.use(TAKER)
             placement = self._placement(held, execution, PLACES)
         if placement is None:
-            raise Ended("replan_failed")
+            raise EpisodeEnded("replan_failed")
         carry, lower, retreat = placement
         assert carry is not None, "it is carried there"
         execution.follow(carry)
@@ -181,7 +184,7 @@ class HandoverCourse(Course):
             _, lower, retreat = found
         execution.meant = NONE_MEANT
         execution.follow(lower)
-        execution.open()
+        execution.open_hand()
         execution.follow(retreat)
         target = replace(self.problem.target, object_to_world=execution.target_to_world())
         home = self._arms.plan_taker_home(
@@ -191,7 +194,7 @@ class HandoverCourse(Course):
             execution.follow(home)
         execution.use(GIVER)
 
-    def _placement(self, held: Held, execution: Execution, most: int = MOST_PLANNED) -> Placement | None:
+    def _placement(self, held: HeldGrasp, execution: Execution, most: int = MOST_PLANNED) -> Placement | None:
         """Plan a placement out of up to ``most`` places, and the motion there from the second arm's current joints."""
         asked = self._arms.with_giver_at(self.problem, self._giver_rad)
         found = self._put_down.plan(asked, held, execution.commanded_rad, execution.gripper_to_object(), most)
@@ -214,10 +217,10 @@ class HandoverCourse(Course):
         """Grasp, lift, measure the object in the hand, replan carry and meeting, and move to the meeting place."""
         give = plan.give
         self.grasp_and_lift(execution, give.reach, give.approach, give.lift)
-        execution.meant = MeantContacts(target=frozenset())
+        execution.meant = AllowedContacts(target=frozenset())
         held = HeldPathPlanner(self._arms.parts)
         asked = self._arms.with_taker_at(self.problem, self._arms.taker.arm.home, None)
-        found = held.again(
+        found = held.replan(
             asked,
             [give.held],
             execution.gripper_to_object(),
@@ -229,16 +232,16 @@ class HandoverCourse(Course):
         self.facts.replans["after_lift" if found is not None else "after_lift_failed"] += 1
         carry, joints = (give.carry, give.joints) if found is None else (found[0], found[2])
         execution.follow(carry)
-        execution.follow(held.timed(joints, MEET_S, Phase.ACT))
+        execution.follow(held.time_path(joints, MEET_S, Phase.ACT))
         self.measure_slip(give, execution)
         self.check_held(execution)
 
     def _rng(self, purpose: int) -> np.random.Generator:
         return np.random.default_rng((self.problem.seed, purpose))
 
-    def _let_go(self, take: Take, execution: Execution) -> None:
+    def _release_and_withdraw(self, take: TakePlan, execution: Execution) -> None:
         """Open the first hand, withdraw it and bring its arm home, as far as a motion is found."""
-        execution.open()
+        execution.open_hand()
         where = self.problem, execution.target_to_world(), execution.commanded_rad, take.joints_rad, take.grasp
         back = self._arms.plan_withdrawal(*where)
         self.facts.replans["withdrawn" if back is not None else "not_withdrawn"] += 1
@@ -247,7 +250,7 @@ class HandoverCourse(Course):
             self._bring_giver_home(take.joints_rad, take, execution)
         self._giver_rad = execution.commanded_rad
 
-    def _bring_giver_home(self, taker_rad: np.ndarray, take: Take, execution: Execution) -> None:
+    def _bring_giver_home(self, taker_rad: np.ndarray, take: TakePlan, execution: Execution) -> None:
         """Bring the first arm home around the second, which holds the target, if a motion is found."""
         where = self.problem, execution.target_to_world(), execution.commanded_rad, taker_rad, take.grasp
         home = self._arms.plan_home(*where)
@@ -257,7 +260,7 @@ class HandoverCourse(Course):
             execution.follow(home)
 
 
-def meetings(target: PlacedObject, middle_m: np.ndarray, rng: np.random.Generator) -> tuple[HeldPath, ...]:
+def sample_meeting_paths(target: PlacedObject, middle_m: np.ndarray, rng: np.random.Generator) -> tuple[HeldPath, ...]:
     """Return sampled paths that bring the target's centre to places in the air near ``middle_m (3,)``.
 
     Some keep the target's tilt and change its heading only; most also tilt it by up to 100 degrees.

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.courses.course import TURNED_RAD, Course, Ended, Start
+from manitwin.episodes.courses.course import TURNED_RAD, Course, EpisodeEnded, EpisodeStart
+from manitwin.episodes.courses.force_control import Admittance, pace_of_press, with_heights
 from manitwin.episodes.courses.held_grasps import grasps_of_task
-from manitwin.episodes.courses.regulated import Admittance, pace_of_press, with_heights
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
@@ -24,10 +24,10 @@ from manitwin.episodes.planning.path_timing import joint_spline, time_quintic
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Motion, Phase
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
-from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask, Regulated
+from manitwin.episodes.skills.held_task import ForceControlledMove, GuardedMove, HeldScene, HeldTask
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
-from manitwin.physics.sapien.contacts import MeantContacts
+from manitwin.physics.sapien.contacts import AllowedContacts
 from manitwin.physics.sapien.world import RobotWorld
 
 BACK_S = 1.2
@@ -46,7 +46,7 @@ class HeldCourse(Course):
 
     lifts_steadily = True
 
-    def __init__(self, start: Start, facts: EpisodeFacts):
+    def __init__(self, start: EpisodeStart, facts: EpisodeFacts):
         """Create the skill's task."""
         super().__init__(start, facts)
         goal, planner = start.skill_goal, start.planner
@@ -64,14 +64,14 @@ class HeldCourse(Course):
             places_m=goal.places_m,
             fixtures=goal.fixtures,
             fingers=frozenset(robot.finger_links),
-            fingertips_m=fingertip_corners(planner.closed),
+            fingertips_m=fingertip_corners(planner.closed_hand),
             tip_depth_m=robot.gripper.tip_depth_m,
             rng=np.random.default_rng((self.problem.seed, 3)),
         )
         self.task: HeldTask = goal.path(scene)
         self.problem = replace(self.problem, entered=self.task.enters)
         self._planner = HeldPathPlanner(
-            planner.closed if self.task.empty else planner.parts,
+            planner.closed_hand if self.task.empty else planner.parts,
             empty=self.task.empty,
             lets_go=self.task.ending == "let_go",
             level_rad=self.task.level_rad,
@@ -79,7 +79,7 @@ class HeldCourse(Course):
         self._watch: EventWatch | None = None
 
     @property
-    def ends_at(self) -> np.ndarray | None:
+    def planned_end_pose(self) -> np.ndarray | None:
         """Planned final pose of the target: at the path's end or where it started; None if it stays in the hand."""
         if self.task.ending == "keep" and not self.task.empty:
             return None
@@ -123,33 +123,33 @@ class HeldCourse(Course):
     def execute(self, execution: Execution) -> None:
         """Grasp and lift (or close the empty hand), carry, follow the path, and end as the task specifies."""
         if self.task.empty:
-            execution.close_empty()
+            execution.close_empty_hand()
             execution.follow(self._reach)
             self._grasp_now = np.eye(4)
         else:
-            self._take(self._plan, execution)
-        been = self._act(execution)
+            self._grasp_and_carry(self._plan, execution)
+        been = self._follow_path(execution)
         self._rest_there(execution)
         if self.task.ending == "let_go":
-            self._let_go(execution)
+            self._release_and_withdraw(execution)
             return
         if not self.task.comes_out:
-            self._go_back(execution, been)
+            self._return_along_path(execution, been)
         if not self.task.empty:
             self.check_held(execution)
         if self.task.ending == "put_back":
             self._put_back(execution)
 
-    def _take(self, plan: HeldPlan, execution: Execution) -> None:
+    def _grasp_and_carry(self, plan: HeldPlan, execution: Execution) -> None:
         """Grasp, lift, replan carry and path for the measured pose in the hand, and carry; replan again if the object turned."""
         self.grasp_and_lift(execution, plan.reach, plan.approach, plan.lift)
         self._grasp_now = plan.gripper_to_object
         carry = self._plan_again(plan.held, plan.joints, execution)
         self.facts.replans["after_lift" if carry is not None else "after_lift_failed"] += 1
         if carry is None:
-            self.set_down_again(plan, execution)
+            self.put_back_if_turned(plan, execution)
         measured = execution.gripper_to_object()
-        execution.meant = MeantContacts(target=frozenset())
+        execution.meant = AllowedContacts(target=frozenset())
         execution.follow(plan.carry if carry is None else carry)
         self.measure_slip(plan, execution)
         self.check_held(execution)
@@ -157,7 +157,7 @@ class HeldCourse(Course):
             carry = self._plan_again(self._held, self._joints, execution)
             self.facts.replans["after_carry" if carry is not None else "after_carry_failed"] += 1
             if carry is None:
-                self.set_down_again(plan, execution)
+                self.put_back_if_turned(plan, execution)
             else:
                 execution.follow(carry)
                 self.check_held(execution)
@@ -165,7 +165,7 @@ class HeldCourse(Course):
     def _plan_again(self, held: HeldPath, joints: CubicSpline, execution: Execution) -> Motion | None:
         """Replan path and carry from here with the measured pose in the hand, trying ``held`` first; None if there is no plan."""
         measured = execution.gripper_to_object()
-        found = self._planner.again(
+        found = self._planner.replan(
             self.problem,
             [held, *(path for path in (*self.task.paths, *self.task.otherwise) if path is not held)],
             measured,
@@ -180,29 +180,29 @@ class HeldCourse(Course):
         self._grasp_now = measured
         return carry
 
-    def _act(self, execution: Execution) -> list[np.ndarray]:
+    def _follow_path(self, execution: Execution) -> list[np.ndarray]:
         """Follow the path; return the joint positions ``(n,)`` along it, for the way back."""
         task, count, meant = self.task, len(self._held.poses), self._held.meant
-        execution.meant = MeantContacts(fingers=meant) if task.empty else MeantContacts(target=meant)
+        execution.meant = AllowedContacts(fingers=meant) if task.empty else AllowedContacts(target=meant)
         been = [execution.commanded_rad]
         smooth = count if task.guard is None else task.guard.first
         parts = min(task.measured, smooth)
         cuts = [round(smooth * part / parts) for part in range(parts + 1)] if parts else [0]
         for first, end in pairwise(cuts):
             joints = self._onward(self._held.part(first, end), execution, (end - 1) / (count - 1))
-            execution.follow(self._planner.timed(joints, task.duration_s / parts, Phase.ACT))
+            execution.follow(self._planner.time_path(joints, task.duration_s / parts, Phase.ACT))
             been += [*joints(np.linspace(0, 1, end - first + 1)[1:-1]), execution.commanded_rad]
         for _ in range(MADE_UP_TIMES if task.steady else 0):
             if turned_rad(self._held.poses[-1], execution.target_to_world()) <= MADE_UP_RAD:
                 break
             joints = self._onward(self._held.part(count - 1, count), execution, 1.0)
-            execution.follow(self._planner.timed(joints, MADE_UP_S, Phase.ACT))
+            execution.follow(self._planner.time_path(joints, MADE_UP_S, Phase.ACT))
         regulated = task.regulated
         if task.guard is not None:
             end = count if regulated is None else regulated.first
-            self._guarded(task.guard, self._held.part(smooth, end), execution)
+            self._move_guarded(task.guard, self._held.part(smooth, end), execution)
         if regulated is not None:
-            self._under_force(regulated, self._held.part(regulated.first, count), execution)
+            self._slide_under_force(regulated, self._held.part(regulated.first, count), execution)
         return been
 
     def _onward(self, part: HeldPath, execution: Execution, place: float) -> CubicSpline:
@@ -212,7 +212,7 @@ class HeldCourse(Course):
         """
         grasps = [self._grasp_now] if self.task.empty else [execution.gripper_to_object(), self._grasp_now]
         for grasp, name in zip(grasps, ("onward", "onward_unmeasured"), strict=False):
-            found = self._planner.onward(
+            found = self._planner.plan_spline(
                 self.problem, part, grasp, execution.commanded_rad, as_hulls=self.task.as_hulls
             )
             if found is not None:
@@ -221,7 +221,7 @@ class HeldCourse(Course):
         self.facts.replans["onward_failed"] += 1
         return joint_spline(np.array([execution.commanded_rad, self._joints(place)]))
 
-    def _guarded(self, guard: Guard, part: HeldPath, execution: Execution) -> None:
+    def _move_guarded(self, guard: GuardedMove, part: HeldPath, execution: Execution) -> None:
         """Move until the watched force reaches the guard's limit, then hold still (or yield, after a blow).
 
         The arm completes the current row of samples after contact. A press therefore creeps close to the expected contact,
@@ -233,7 +233,7 @@ class HeldCourse(Course):
         tips = [self.start.planner.tip_pose(joints(place))[:3, 3] for place in np.linspace(0, 1, 5)]
         way_m = float(np.linalg.norm(np.diff(tips, axis=0), axis=1).sum())
         duration_s = guard.duration_s if guard.speed_m_s is None else PEAK_OF_QUINTIC * way_m / guard.speed_m_s
-        motion = self._planner.timed(joints, duration_s, Phase.ACT, beyond=guard.beyond)
+        motion = self._planner.time_path(joints, duration_s, Phase.ACT, beyond=guard.beyond)
         touched: Callable[[], bool] = lambda: watch.force_n >= guard.stop_n  # noqa: E731
         grasp = self._grasp_now if self.task.empty else execution.gripper_to_object()
         there_m = (part.poses[max(guard.touches - guard.first, 0)] @ grasp)[:3, 3]
@@ -249,10 +249,10 @@ class HeldCourse(Course):
         blow = execution.delayed(motion, touches)
         touches += len(blow.positions_rad) - len(motion.positions_rad)
         if execution.follow(blow, until=touched, pace=lambda first: float(first <= touches), yields=True):
-            execution.yield_here()
+            execution.adopt_actual_joints()
         execution.wait_s(Phase.HOLD, YIELDED_S)
 
-    def _under_force(self, regulated: Regulated, part: HeldPath, execution: Execution) -> None:
+    def _slide_under_force(self, regulated: ForceControlledMove, part: HeldPath, execution: Execution) -> None:
         """Slide along a path from the current contact with force control along the normal, then rise.
 
         Raises Ended if there is no plan from here.
@@ -264,12 +264,12 @@ class HeldCourse(Course):
         measured, planner, both = execution.gripper_to_object(), self._planner, None
         for way, grasp in ((onward, measured), (part, measured), (part, self._grasp_now)):
             way = way.part(1, len(way.poses))
-            joints = planner.onward(self.problem, way, grasp, execution.commanded_rad, as_hulls=self.task.as_hulls)
+            joints = planner.plan_spline(self.problem, way, grasp, execution.commanded_rad, as_hulls=self.task.as_hulls)
             both = None if joints is None else with_heights(joints, arm, regulated.normal)
             if both is not None:
                 break
         if both is None:
-            raise Ended("replan_failed")
+            raise EpisodeEnded("replan_failed")
         way_m = float(np.linalg.norm(np.diff(steps_m, axis=0), axis=1).sum())
         limits = tuple(np.concatenate([each, np.full(len(each), np.inf)]) for each in self._own.parts.motions.limits)
         rows, speeds = time_quintic(
@@ -286,16 +286,16 @@ class HeldCourse(Course):
         if not self.task.empty:
             self.check_held(execution)
 
-    def _let_go(self, execution: Execution) -> None:
+    def _release_and_withdraw(self, execution: Execution) -> None:
         """Open the hand and withdraw it as far as there is room."""
-        execution.meant = MeantContacts()
-        execution.open()
+        execution.meant = AllowedContacts()
+        execution.open_hand()
         away = plan_withdrawal(self._own.parts, self.problem, execution.target_to_world(), execution.commanded_rad)
         self.facts.replans["withdrawn" if away is not None else "not_withdrawn"] += 1
         if away is not None:
             execution.follow(away)
 
-    def _go_back(self, execution: Execution, been: list[np.ndarray]) -> None:
+    def _return_along_path(self, execution: Execution, been: list[np.ndarray]) -> None:
         """Go back along the path, replanned from here, or else along the joint positions of the way there."""
         poses = self._held.poses[:1] if self.task.guard is not None else self._held.poses[::-1][1:]
         if self.task.rises:
@@ -305,15 +305,17 @@ class HeldCourse(Course):
             )
         way = HeldPath(poses, self._held.meant)
         grasp = self._grasp_now if self.task.empty else execution.gripper_to_object()
-        joints = self._planner.onward(self.problem, way, grasp, execution.commanded_rad, as_hulls=self.task.as_hulls)
+        joints = self._planner.plan_spline(
+            self.problem, way, grasp, execution.commanded_rad, as_hulls=self.task.as_hulls
+        )
         self.facts.replans["back" if joints is not None else "back_as_it_came"] += 1
         if joints is None:
             joints = joint_spline(np.array([execution.commanded_rad, *been[::-1]]))
-        execution.follow(self._planner.timed(joints, BACK_S, Phase.RETURN))
+        execution.follow(self._planner.time_path(joints, BACK_S, Phase.RETURN))
 
     def _put_back(self, execution: Execution) -> None:
         """Put the target down where it was, or there with another heading; raises Ended if none can be planned."""
-        execution.meant = MeantContacts()
+        execution.meant = AllowedContacts()
         here, measured = execution.commanded_rad, execution.gripper_to_object()
         for angle_rad in PUT_BACK_RAD:
             goal = turned_in_place(self.problem.target, angle_rad)
@@ -322,13 +324,13 @@ class HeldCourse(Course):
             if found is not None:
                 break
         else:
-            raise Ended("replan_failed")
+            raise EpisodeEnded("replan_failed")
         self.facts.replans["put_back" if angle_rad == 0 else "put_back_turned"] += 1
         carry, lower, retreat = found
         assert isinstance(carry, Motion)
         execution.follow(carry)
         execution.follow(lower)
-        execution.open()
+        execution.open_hand()
         execution.follow(retreat)
 
 

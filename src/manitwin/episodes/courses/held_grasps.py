@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from manitwin.episodes.courses.course import first_and_last
+from manitwin.episodes.courses.course import split_by_quality
+from manitwin.episodes.grasp_stability import has_narrow_contact, stable_along_path
 from manitwin.episodes.planning.problem import Grasp, PlanFailure
 from manitwin.episodes.skills.held_task import HeldTask
-from manitwin.episodes.steady_grasps import steady_on_the_way, touch_narrowly
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.robots.grippers.gripper import Gripper
 
@@ -24,7 +24,7 @@ def grasps_of_task(
     ranked = [grasp for tier in tiers for grasp in _ranked(tier, task, body, gripper)]
     left_out = Counter[PlanFailure]({"blocks_function": sum(map(len, tiers)) - len(ranked)})
     if task.steady:
-        steady = steady_on_the_way(ranked, body, [path.poses for path in task.paths], gripper)
+        steady = stable_along_path(ranked, body, [path.poses for path in task.paths], gripper)
         left_out["weight_not_borne"] = len(ranked) - len(steady)
         ranked = steady
     return tuple(ranked), +left_out
@@ -35,7 +35,7 @@ def _ranked(grasps: Sequence[Grasp], task: HeldTask, body: RigidBody, gripper: G
 
     Among equal ranks, grasps with broad pad contact come first.
     """
-    narrow = touch_narrowly(grasps, body, gripper)
+    narrow = has_narrow_contact(grasps, body, gripper)
     ranks = [(task.rank(grasp), late, grasp) for grasp, late in zip(grasps, narrow, strict=True)]
     free = [(rank, late, grasp) for rank, late, grasp in ranks if rank is not None]
-    return [grasp for part in first_and_last(free) for *_, grasp in sorted(part, key=lambda each: each[:2])]
+    return [grasp for part in split_by_quality(free) for *_, grasp in sorted(part, key=lambda each: each[:2])]

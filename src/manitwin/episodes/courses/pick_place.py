@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from manitwin.episodes.courses.course import Course, Ended
+from manitwin.episodes.courses.course import Course, EpisodeEnded
 from manitwin.episodes.events import ContactWatch, EventWatch
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.outcome import moved_m, turned_rad
@@ -15,7 +15,7 @@ from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase, PickPlacePlan
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.geometry.poses import inverse
-from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
+from manitwin.physics.sapien.contacts import NONE_MEANT, AllowedContacts
 from manitwin.physics.sapien.world import RobotWorld
 
 # a fifth of the tolerance of a placement: a smaller slip is no reason to give up
@@ -77,15 +77,15 @@ class PickPlaceCourse(Course):
         plan = self._plan
         self.grasp_and_lift(execution, plan.reach, plan.approach, plan.lift)
         placement = _Placement(plan.gripper_to_object, plan.carry, plan.lower, plan.retreat)
-        anew = self._placed_anew(plan, execution, with_carry=True)
+        anew = self._replan_placement(plan, execution, with_carry=True)
         self.facts.replans["after_lift" if anew is not None else "after_lift_failed"] += 1
         if anew is None:
-            self.set_down_again(plan, execution)
+            self.put_back_if_turned(plan, execution)
         placement = anew or placement
         if placement.carry is not None:
             execution.follow(placement.carry)
         self.check_held(execution)
-        placement = self._placed_late(plan, execution, placement)
+        placement = self._replan_lowering(plan, execution, placement)
         if placement.carry is not None:
             execution.follow(placement.carry)
         arrived = self._lower(placement.lower, execution)
@@ -94,7 +94,7 @@ class PickPlaceCourse(Course):
         if self._touch is not None:
             self._let_fall(placement.retreat if arrived else None, execution)
             return
-        execution.open()
+        execution.open_hand()
         execution.follow(placement.retreat)
 
     def _lower(self, lower: Motion, execution: Execution) -> bool:
@@ -113,8 +113,8 @@ class PickPlaceCourse(Course):
         ``retreat`` None: lowering ended early, so the planned retreat does not apply. The hand withdraws a second time if the
         object leans on it.
         """
-        execution.meant = MeantContacts(palm=True)
-        execution.open()
+        execution.meant = AllowedContacts(palm=True)
+        execution.open_hand()
         self._wait_until_it_lies(execution)
         if retreat is not None:
             execution.follow(retreat)
@@ -138,12 +138,12 @@ class PickPlaceCourse(Course):
         planner = self.start.planner
         if isinstance(planner, PickPlacePlanner):
             here = execution.target_to_world(), execution.commanded_rad
-            away = plan_withdrawal(planner.of(self.facts.grasp).parts, self.problem, *here, blind=blind)
+            away = plan_withdrawal(planner.with_opening_of(self.facts.grasp).parts, self.problem, *here, blind=blind)
             self.facts.replans["withdrawn" if away is not None else "not_withdrawn"] += 1
             if away is not None:
                 execution.follow(away)
 
-    def _placed_anew(
+    def _replan_placement(
         self, plan: PickPlacePlan, execution: Execution, *, with_carry: bool, at: np.ndarray | None = None
     ) -> _Placement | None:
         """Replan the placement with the measured pose in the hand; ``at`` replaces the planned goal pose of the target."""
@@ -152,14 +152,14 @@ class PickPlaceCourse(Course):
         found = self.start.planner.plan_place(self.problem, plan, execution.commanded_rad, measured, goal, with_carry)
         return None if found is None else _Placement(measured, *found)
 
-    def _placed_late(self, plan: PickPlacePlan, execution: Execution, before: _Placement) -> _Placement:
+    def _replan_lowering(self, plan: PickPlacePlan, execution: Execution, before: _Placement) -> _Placement:
         """Replan the lowering from here, then with another carry, then to another pose that reaches the goal.
 
         The plan ``before`` is kept if the object has moved little in the hand since. Raises Ended if nothing is feasible.
         """
         self.measure_slip(plan, execution)
         for with_carry in (False, True):
-            found = self._placed_anew(plan, execution, with_carry=with_carry)
+            found = self._replan_placement(plan, execution, with_carry=with_carry)
             if found is not None:
                 self.facts.replans["late_with_carry" if with_carry else "late"] += 1
                 return found
@@ -169,12 +169,12 @@ class PickPlaceCourse(Course):
             self.facts.replans["late_not_needed"] += 1
             return replace(before, carry=None)
         for pose in () if self.start.skill_goal is None else self.start.skill_goal.poses:
-            found = self._placed_anew(plan, execution, with_carry=True, at=pose)
+            found = self._replan_placement(plan, execution, with_carry=True, at=pose)
             if found is not None:
                 self.facts.replans["late_elsewhere"] += 1
                 self.goal_object_to_world = pose
                 return found
-        raise Ended("replan_failed")
+        raise EpisodeEnded("replan_failed")
 
 
 def raised(pose: np.ndarray, height_m: float) -> np.ndarray:

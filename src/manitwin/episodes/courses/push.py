@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from manitwin.episodes.courses.course import Course, Ended, Start
+from manitwin.episodes.courses.course import Course, EpisodeEnded, EpisodeStart
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
@@ -22,7 +22,7 @@ from manitwin.episodes.skills.push import MARK
 from manitwin.episodes.skills.strokes import arc_to, strokes
 from manitwin.episodes.tool_watches import PushWatch
 from manitwin.geometry.poses import transform, transform_points
-from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
+from manitwin.physics.sapien.contacts import NONE_MEANT, AllowedContacts
 from manitwin.physics.sapien.world import RobotWorld
 
 STROKES = 8
@@ -38,20 +38,20 @@ SETTLES_S, BACK_S = 0.25, 1.0
 class PushCourse(Course):
     """Strokes until the object has arrived, or none can be planned."""
 
-    def __init__(self, start: Start, facts: EpisodeFacts):
+    def __init__(self, start: EpisodeStart, facts: EpisodeFacts):
         """Take the place that the goal marks."""
         super().__init__(start, facts)
         assert start.skill_goal is not None
         assert isinstance(start.planner, PickPlacePlanner), "strokes are planned with the models of this planner"
         self._place_m = start.skill_goal.places_m[MARK]
-        self._planner = HeldPathPlanner(start.planner.closed, empty=True)
-        self._fingertips_m = fingertip_corners(start.planner.closed)
+        self._planner = HeldPathPlanner(start.planner.closed_hand, empty=True)
+        self._fingertips_m = fingertip_corners(start.planner.closed_hand)
         target = self.problem.target
         corners = transform_points(target.object_to_world, np.concatenate(target.body.hulls))
         self._level_m = float(corners[:, 2].min())
 
     @property
-    def ends_at(self) -> np.ndarray | None:
+    def planned_end_pose(self) -> np.ndarray | None:
         """Planned final pose of the target: at the place, with its current orientation."""
         target = self.problem.target
         way = self._place_m - transform_points(target.object_to_world, target.body.center_of_mass_m[None])[0]
@@ -76,13 +76,13 @@ class PushCourse(Course):
 
     def execute(self, execution: Execution) -> None:
         """Push, measure, and push again; raises Ended if the object topples or no stroke can be planned."""
-        execution.close_empty()
+        execution.close_empty_hand()
         found: tuple[Motion, HeldPath, CubicSpline] | None = self._first
         for number in range(STROKES):
             if found is None:
                 if self._off_m(execution) <= NEAR_ENOUGH_M:
                     return
-                raise Ended("replan_failed")
+                raise EpisodeEnded("replan_failed")
             self._push(execution, *found)
             execution.wait_s(Phase.HOLD, SETTLES_S)
             self.facts.replans["strokes"] = number + 1
@@ -107,7 +107,7 @@ class PushCourse(Course):
     def _push(self, execution: Execution, reach: Motion, path: HeldPath, joints: CubicSpline) -> None:
         """Move behind the object, push until it has arrived or deviates, and go back."""
         execution.follow(reach)
-        execution.meant = MeantContacts(fingers=path.meant)
+        execution.meant = AllowedContacts(fingers=path.meant)
         upright = execution.target_to_world()[:3, :3]
         begun_m, way = self._center_m(execution), self._place_m[:2] - self._center_m(execution)[:2]
         length_m = float(np.linalg.norm(way))
@@ -120,11 +120,11 @@ class PushCourse(Course):
 
         tip = self.start.planner.tip_pose
         way_m = float(np.linalg.norm(tip(joints(1.0))[:3, 3] - tip(joints(0.0))[:3, 3]))
-        motion = self._planner.timed(joints, 1.9 * way_m / SPEED_M_S, Phase.ACT)
+        motion = self._planner.time_path(joints, 1.9 * way_m / SPEED_M_S, Phase.ACT)
         execution.follow(motion, until=ends)
         leant = np.arccos(np.clip((upright.T @ execution.target_to_world()[:3, :3])[2, 2], -1, 1))
         if leant > TOPPLING_RAD:
-            raise Ended("toppled")
+            raise EpisodeEnded("toppled")
         self._back(execution, path, joints)
         execution.meant = NONE_MEANT
 
@@ -133,14 +133,14 @@ class PushCourse(Course):
         here = replace(self.problem, target=replace(self.problem.target, object_to_world=execution.target_to_world()))
         now = self.start.planner.tip_pose(execution.commanded_rad)
         away = HeldPath(np.array(arc_to(now, _direction(path))[::-1]), path.meant)
-        way = self._planner.onward(here, away, np.eye(4), execution.commanded_rad, as_hulls=False)
+        way = self._planner.plan_spline(here, away, np.eye(4), execution.commanded_rad, as_hulls=False)
         self.facts.replans["back" if way is not None else "back_as_it_came"] += 1
         if way is None:
             places = np.linspace(0, 1, 200)
             been = joints(places)
             last = int(np.linalg.norm(been - execution.commanded_rad, axis=1).argmin())
             way = joint_spline(np.array([execution.commanded_rad, *been[: max(last, 1)][::-20], been[0]]))
-        execution.follow(self._planner.timed(way, BACK_S, Phase.RETURN))
+        execution.follow(self._planner.time_path(way, BACK_S, Phase.RETURN))
 
     def _center_m(self, execution: Execution) -> np.ndarray:
         center = self.problem.target.body.center_of_mass_m[None]

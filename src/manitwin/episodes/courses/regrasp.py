@@ -8,7 +8,7 @@ from itertools import islice
 
 import numpy as np
 
-from manitwin.episodes.courses.course import Ended, tiers_of
+from manitwin.episodes.courses.course import EpisodeEnded, grasp_tiers
 from manitwin.episodes.courses.pick_place import PickPlaceCourse, raised
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
@@ -25,15 +25,15 @@ class RegraspCourse(PickPlaceCourse):
 
     def plan(self) -> bool:
         """Plan directly; otherwise via an intermediate pose: the goal from there, then the way there."""
-        return any(self.plan_with(grasps) or self._plan_by_a_way(grasps) for grasps in self.tiers())
+        return any(self.plan_with(grasps) or self._plan_via_intermediate_pose(grasps) for grasps in self.tiers())
 
-    def _plan_by_a_way(self, grasps: Sequence[Grasp]) -> bool:
+    def _plan_via_intermediate_pose(self, grasps: Sequence[Grasp]) -> bool:
         """Plan the goal from an intermediate pose and the motion to that pose; return whether both were found."""
         start = self.start
         goal = start.skill_goal
         for way in islice(() if goal is None or goal.ways is None else goal.ways, WAYS):
             there = replace(start.problem, target=replace(start.problem.target, object_to_world=way))
-            tiers = tiers_of(replace(start, problem=there))
+            tiers = grasp_tiers(replace(start, problem=there))
             reached = self._goal_from(replace(there, grasps=sum(tiers, ())))
             if reached is None:
                 continue
@@ -54,7 +54,7 @@ class RegraspCourse(PickPlaceCourse):
             self._plan, self.problem = self._way
             super().execute(execution)
             self.facts.replans["put_down"] += 1
-            self._plan_from_there(execution)
+            self._plan_from_intermediate_pose(execution)
         super().execute(execution)
 
     def _goal_from(self, problem: PickPlaceProblem) -> np.ndarray | None:
@@ -66,17 +66,17 @@ class RegraspCourse(PickPlaceCourse):
                 return pose
         return None
 
-    def _plan_from_there(self, execution: Execution) -> None:
+    def _plan_from_intermediate_pose(self, execution: Execution) -> None:
         """Let the target settle, bring the arm home, and plan from there; raises Ended if planning fails."""
         settings, planner = self.start.settings, self.start.planner
-        execution.rest(round(settings.max_rest_s / settings.timestep_s))
+        execution.wait_for_rest(round(settings.max_rest_s / settings.timestep_s))
         execution.meant = NONE_MEANT
         target = replace(self.problem.target, object_to_world=execution.target_to_world())
         self.start = replace(self.start, problem=replace(self.start.problem, target=target))
         assert isinstance(planner, PickPlacePlanner), "the way home is planned with the models of this planner"
-        home = planner.of(self.facts.grasp).plan_way_home(self.start.problem, execution.commanded_rad)
+        home = planner.with_opening_of(self.facts.grasp).plan_return_home(self.start.problem, execution.commanded_rad)
         if home is None:
-            raise Ended("replan_failed")
+            raise EpisodeEnded("replan_failed")
         execution.follow(home)
         if not super().plan():
-            raise Ended("replan_failed")
+            raise EpisodeEnded("replan_failed")

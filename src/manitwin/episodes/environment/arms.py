@@ -8,7 +8,7 @@ import numpy as np
 from sapien import physx
 
 from manitwin.episodes.joint_targets import JointTargets, hand_share, may_hold
-from manitwin.physics.sapien.controls.control import control_of
+from manitwin.physics.sapien.controls.control import create_hand_control
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 
@@ -23,9 +23,9 @@ class Arms:
         self._world = world
         self._hands = []
         for number in range(len(world.robots)):
-            world.use(number)
-            self._hands.append(control_of(world, closing))
-        world.use(0)
+            world.select_arm(number)
+            self._hands.append(create_hand_control(world, closing))
+        world.select_arm(0)
         self._told = self._open = np.concatenate([hand.told for hand in self._hands])
         lowest_rad, highest_rad = zip(*(arm.limits_rad for arm in world.robots), strict=True)
         self._last_rad, self._fastest_rad_s = np.asarray(joints_rad, float), fastest_rad_s
@@ -37,7 +37,7 @@ class Arms:
         """Tell whether the current or previous hand command differs from the initial one."""
         return may_hold(hand, self._told, self._open)
 
-    def towards(self, joints_rad: np.ndarray, hand: np.ndarray, count: int) -> Iterator[int]:
+    def apply_action(self, joints_rad: np.ndarray, hand: np.ndarray, count: int) -> Iterator[int]:
         """Set joint and hand targets for each time step; yields the number, from 1, of each step to simulate.
 
         Joint commands are limited to the fastest joint speed, because the drives would follow a jump faster than a motor can.
@@ -46,11 +46,15 @@ class Arms:
         most_rad = ROUNDING * self._fastest_rad_s * count * dt
         joints_rad = np.clip(joints_rad, self._last_rad - most_rad, self._last_rad + most_rad)
         self._last_rad = joints_rad
-        for number, (target, speed) in enumerate(zip(*self._targets.towards(joints_rad, count), strict=True), start=1):
+        for number, (target, speed) in enumerate(
+            zip(*self._targets.interpolate_to(joints_rad, count), strict=True), start=1
+        ):
             velocities = speed / (count * dt)
             # as in episodes: the drives' targets are those of the middle of the step
-            positions = by_arm(self._world, target - velocities * (dt / 2))
-            for arm, there, speeds in zip(self._world.robots, positions, by_arm(self._world, velocities), strict=True):
+            positions = split_by_arm(self._world, target - velocities * (dt / 2))
+            for arm, there, speeds in zip(
+                self._world.robots, positions, split_by_arm(self._world, velocities), strict=True
+            ):
                 arm.set_targets(there, speeds)
             told = before + hand_share(number, self._per_frame, count) * (hand - before)
             for control, part in zip(self._hands, np.split(told, len(self._hands)), strict=True):
@@ -72,6 +76,6 @@ class Arms:
         return np.concatenate([hand.state for hand in self._hands])
 
 
-def by_arm(world: RobotWorld, joints: np.ndarray) -> list[np.ndarray]:
+def split_by_arm(world: RobotWorld, joints: np.ndarray) -> list[np.ndarray]:
     """Split values of all joints ``(n,)`` by arm."""
     return np.split(joints, np.cumsum([len(arm.robot.arm_joints) for arm in world.robots])[:-1])

@@ -12,24 +12,24 @@ import numpy as np
 from gymnasium import spaces
 
 from manitwin.episodes.cameras import named_cameras
-from manitwin.episodes.courses.course import Start
+from manitwin.episodes.courses.course import EpisodeStart
+from manitwin.episodes.downsampling import rows_per_frame
 from manitwin.episodes.environment.action_limits import action_limits, checked_action
-from manitwin.episodes.environment.arms import Arms, by_arm
+from manitwin.episodes.environment.arms import Arms, split_by_arm
 from manitwin.episodes.environment.observed_poses import ObservedPoses
 from manitwin.episodes.environment.start_noise import DrawnStart, StartNoise, draw_start
-from manitwin.episodes.episode import closing_of, settled, world_of
+from manitwin.episodes.episode import closing_of, create_world, settle_start
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import REST_ROWS, STILL_ROWS, WATCH_S
 from manitwin.episodes.fixtures import to_json
 from manitwin.episodes.goals.evaluation import Evaluation, evaluate
 from manitwin.episodes.judging import is_reached_already, state_of
-from manitwin.episodes.lower_rates import rows_per_frame
 from manitwin.episodes.outcome import is_at_rest
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.recording import RATE_HZ
-from manitwin.episodes.sequence import course_of, problem_of
+from manitwin.episodes.sequence import create_course, problem_of
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.tasks.task_setting import TaskSetting
 from manitwin.errors import UsageError
@@ -40,7 +40,7 @@ MOST_METRES, MOST_SPEED = 10.0, 100.0
 STARTS_TRIED = 8  # with noise: a start is settled, and rejected if something falls or the goal is already true
 
 
-class Painter(Protocol):
+class StateRenderer(Protocol):
     """Interface for rendering an environment's state: ``(size, size, 3) uint8`` for each camera."""
 
     def paint(self, world: RobotWorld) -> dict[str, np.ndarray]:
@@ -80,7 +80,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         *,
         max_steps: int,
         rate_hz: int = RATE_HZ,
-        painter: Painter | None = None,
+        painter: StateRenderer | None = None,
         cameras: Sequence[str] = (),
         picture_px: int = 128,
         start_noise: StartNoise | None = None,
@@ -206,16 +206,16 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
             self._painter.close()
             self._painter = None
 
-    def _begun(self) -> tuple[Start, RobotWorld, DrawnStart | None]:
+    def _begun(self) -> tuple[EpisodeStart, RobotWorld, DrawnStart | None]:
         """Return a settled start; with noise the first drawn one that is stable and whose goal is not true yet."""
         if self._noise is None:
-            start, world = self._settled(self._setting.problem, None)
+            start, world = self._settle_world(self._setting.problem, None)
             if start is None:
                 raise UsageError(f"task {self.task.task_id}: its scene is not stable; make the layouts again")
             return start, world, None
         for _ in range(STARTS_TRIED):
             drawn = draw_start(self._noise, self._setting, self._planner, self.np_random)
-            start, world = self._settled(drawn.problem, drawn.joints_rad)
+            start, world = self._settle_world(drawn.problem, drawn.joints_rad)
             if start is not None and not is_reached_already(start, world):
                 return start, world, drawn
         self._leave()
@@ -224,16 +224,18 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
             f" not yet reached; give less start_noise"
         )
 
-    def _settled(self, problem: PickPlaceProblem, joints_rad: np.ndarray | None) -> tuple[Start | None, RobotWorld]:
+    def _settle_world(
+        self, problem: PickPlaceProblem, joints_rad: np.ndarray | None
+    ) -> tuple[EpisodeStart | None, RobotWorld]:
         """Replace the world by one of this problem and let it settle, with the arm at home or at ``joints_rad``."""
         self._leave()
-        self._world = world = world_of(problem, self._robot, self._settings, self._closing.force_n)
+        self._world = world = create_world(problem, self._robot, self._settings, self._closing.force_n)
         self._observed = ObservedPoses(world)
         if joints_rad is not None:
-            for arm, part in zip(world.robots, by_arm(world, joints_rad), strict=True):
+            for arm, part in zip(world.robots, split_by_arm(world, joints_rad), strict=True):
                 arm.put(part, arm.robot.open_hand)
-        world.will_hold(self._setting.sequence.moved)
-        return settled(problem, self._planner, self._settings, self._setting.goal, world), world
+        world.set_held_objects(self._setting.sequence.moved)
+        return settle_start(problem, self._planner, self._settings, self._setting.goal, world), world
 
     def _leave(self) -> None:
         if self._world is not None:
@@ -244,7 +246,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
     def _move(self, world: RobotWorld, joints_rad: np.ndarray, hand: np.ndarray) -> None:
         arms, dt, count = self._arms, self._settings.timestep_s, self._row_substeps * self._rows
         world.expect_load(arms.may_hold(hand))
-        for number in arms.towards(joints_rad, hand, count):
+        for number in arms.apply_action(joints_rad, hand, count):
             last = arms.joint_positions() if number == count else None
             world.step()
             if number % self._per_look == 0 and (self._watches or arms.feel):
@@ -258,16 +260,16 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
             if last is not None:
                 self._velocities = (arms.joint_positions() - last) / dt
 
-    def _event_watches(self, start: Start, world: RobotWorld) -> list[EventWatch]:
+    def _event_watches(self, start: EpisodeStart, world: RobotWorld) -> list[EventWatch]:
         """Return the watches for the events of every step's goal, as its course in an episode uses them."""
         watches: list[EventWatch] = []
         for step in self._setting.sequence.steps:
-            if not step.goal.is_of_a_path:
+            if not step.goal.has_path:
                 continue
             number = [each.name for each in start.objects].index(step.target)
             problem = problem_of(start.problem, start.objects, number, step.grasps)
-            own = Start(problem, start.objects, self._planner, self._settings, step.goal, start.granules_in)
-            watches += course_of(own, EpisodeFacts()).watches(world)
+            own = EpisodeStart(problem, start.objects, self._planner, self._settings, step.goal, start.granules_in)
+            watches += create_course(own, EpisodeFacts()).watches(world)
         return watches
 
     def _object_poses(self) -> list[np.ndarray]:
@@ -276,7 +278,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
 
     def _pairs(self) -> frozenset[frozenset[str]]:
         assert self._world is not None
-        return frozenset(self._world.contacts.pressing(self._world.contacts.read()))
+        return frozenset(self._world.contacts.pressing_pairs(self._world.contacts.read()))
 
     def _evaluation(self) -> Evaluation:
         assert self._world is not None

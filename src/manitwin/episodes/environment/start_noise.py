@@ -165,7 +165,7 @@ def _of_one_arm(
     home_rad, arm = np.array(planner.robot.home_rad, float), planner.arm
     if not noise.joints_rad:
         return home_rad
-    world = planner.parts.world_of(problem, problem.goal_object_to_world).arm
+    world = planner.parts.problem_world(problem, problem.goal_object_to_world).arm
     world.enter(Phase.REACH)
     for _ in range(DRAWS_TRIED):
         drawn = home_rad + noise.joints_rad * rng.standard_normal(len(home_rad))

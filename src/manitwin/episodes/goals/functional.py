@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from manitwin.episodes.goals.goal import Literal
-from manitwin.episodes.goals.spatial import Judgement, judged
+from manitwin.episodes.goals.spatial import Judgement, judgement_from_conditions
 from manitwin.episodes.goals.world_state import Event, Granules, Hole, ObjectState, Peg, WorldState
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.hull_holes import enclosed_share
@@ -26,15 +26,15 @@ FELL_M = 0.02  # an object released with some tilt settles by its own weight
 OBLONG, CLOSED_SHARE, LEAST_SLOPE = 4.5, 0.9, 0.3  # thresholds of hole detection (geometry.frames.hole)
 
 
-def granules_in(vessel: ObjectState, granules: Granules) -> np.ndarray:
+def is_granule_inside(vessel: ObjectState, granules: Granules) -> np.ndarray:
     """Return for each granule whether it lies in a vessel's cavity, ``(N,)`` bool."""
     if vessel.opening is None:
         return np.zeros(len(granules.positions_m), bool)
     positions_m = transform_points(inverse(vessel.object_to_world), granules.positions_m)
-    return cavity_holds(vessel.opening, np.concatenate(vessel.body.hulls), positions_m, granules.radius_m)
+    return is_in_cavity(vessel.opening, np.concatenate(vessel.body.hulls), positions_m, granules.radius_m)
 
 
-def cavity_holds(
+def is_in_cavity(
     opening: Opening, corners_m: np.ndarray, positions_m: np.ndarray, granule_radius_m: float
 ) -> np.ndarray:
     """Return which granules ``(..., 3)`` in a vessel's frame lie in its cavity, ``(...)`` bool.
@@ -59,16 +59,16 @@ def cavity_holds(
 def poured(state: WorldState, literal: Literal) -> Judgement:
     """Judge that the value's share of an object's granules is in another object, and at most 5 % in neither."""
     assert literal.value is not None and literal.second is not None
-    source, vessel = state.of(literal.subject), state.of(literal.second)
+    source, vessel = state.object_state(literal.subject), state.object_state(literal.second)
     held = state.granules_at_start.get(literal.subject, 0)
     if state.granules is None or not held:
         return Judgement(False, "nothing_to_pour", {"granules": 0.0})
-    in_vessel, in_source = granules_in(vessel, state.granules), granules_in(source, state.granules)
+    in_vessel, in_source = is_granule_inside(vessel, state.granules), is_granule_inside(source, state.granules)
     there_before = state.granules_at_start.get(literal.second, 0)
     share = (int(in_vessel.sum()) - there_before) / held
     spilt = int((~in_vessel & ~in_source).sum()) / held
     left = int((in_source & ~in_vessel).sum()) / held
-    return judged(
+    return judgement_from_conditions(
         {"spilt": spilt <= MOST_SPILT, "left_in": share >= literal.value},
         {"share": share, "spilt": spilt, "left": left, "granules": held},
     )
@@ -85,7 +85,7 @@ def pressed(state: WorldState, literal: Literal) -> Judgement:
     if not found:
         return Judgement(False, "not_touched", {})
     touches = [
-        judged(
+        judgement_from_conditions(
             {
                 "off": event.values["off_m"] <= PRESS_RADIUS_M,
                 "askew": event.values["angle_rad"] <= PRESS_RAD,
@@ -110,7 +110,7 @@ def struck(state: WorldState, literal: Literal) -> Judgement:
     if not found:
         return Judgement(False, "missed", {})
     first = found[0]
-    return judged(
+    return judgement_from_conditions(
         {
             "wrong_face": first.values["off_m"] <= CORNER_OF_SQUARE * first.values["face_radius_m"],
             "askew": first.values["angle_rad"] <= STRIKE_RAD,
@@ -127,13 +127,13 @@ def hung(state: WorldState, literal: Literal) -> Judgement:
     is oblong).
     """
     assert literal.second is not None
-    thing, peg = state.of(literal.subject), state.peg(literal.second)
+    thing, peg = state.object_state(literal.subject), state.peg(literal.second)
     if thing.hole is None:
         return Judgement(False, "no_hole", {})
     center = transform_points(thing.object_to_world, thing.hole.center_m[None])[0] - peg.foot_m
     along_m = float(center @ peg.direction)
     off_m = float(np.linalg.norm(center - along_m * peg.direction))
-    return judged(
+    return judgement_from_conditions(
         {
             "beside_it": 0 < along_m < peg.length_m
             and (off_m <= thing.hole.radius_m + HANG_SLACK_M or _encloses(thing, thing.hole, peg)),
@@ -149,7 +149,7 @@ def hung(state: WorldState, literal: Literal) -> Judgement:
 def inserted(state: WorldState, literal: Literal) -> Judgement:
     """Judge that an object stands in a holder tip down, its tip at least the value below the rim, supported by nothing else."""
     assert literal.second is not None and literal.value is not None
-    thing, into = state.of(literal.subject), state.holder(literal.second)
+    thing, into = state.object_state(literal.subject), state.holder(literal.second)
     if thing.tip is None:
         return Judgement(False, "no_tip", {})
     to_rim = inverse(into.rim_to_world) @ thing.object_to_world
@@ -158,7 +158,7 @@ def inserted(state: WorldState, literal: Literal) -> Judgement:
     within = bool((np.abs(tip_m[:2]) <= into.half_m + INSERTED_SLACK_M).all())
     angle_rad = float(np.arccos(np.clip(-(to_rim[:3, :3] @ thing.tip.direction)[2], -1, 1)))
     touched = state.neighbours(literal.subject)
-    return judged(
+    return judgement_from_conditions(
         {
             "beside_it": within,
             "wrong_end": angle_rad <= np.pi / 2,
@@ -179,14 +179,14 @@ def handed_over(state: WorldState, literal: Literal) -> Judgement:
     It is put down if both arms have released it and it rests on furniture alone, at most 2 cm below where it was released.
     """
     assert literal.value is not None
-    thing, touched = state.of(literal.subject), state.neighbours(literal.subject)
+    thing, touched = state.object_state(literal.subject), state.neighbours(literal.subject)
     if len(state.arms) != 2:
         return Judgement(False, "one_arm", {})
     found = _events(state, "handed_over", literal)
     if not found:
         return Judgement(False, "not_taken", {})
     values = found[-1].values
-    return judged(
+    return judgement_from_conditions(
         {
             "low": values["rise_m"] >= literal.value,
             "not_released": not touched & state.robots,

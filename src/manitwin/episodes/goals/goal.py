@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Literal:
         """Fill in the default value; raises UsageError for an unknown predicate or invalid arguments."""
         signature = SIGNATURES.get(self.predicate)
         if signature is None:
-            raise UsageError(choose_from("predicate", self.predicate, SIGNATURES))
+            raise UsageError(unknown_name_message("predicate", self.predicate, SIGNATURES))
         if (self.second is None) != (signature.second is None):
             wants = f"needs a second argument, a {signature.second}" if signature.second else "takes one argument"
             raise UsageError(f"{self.predicate} {wants}: {self.subject}, {self.second}")

@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 
 from manitwin.episodes.goals.goal import Literal
-from manitwin.episodes.naming import Name, called, names_of
+from manitwin.episodes.naming import Name, category_names, names_of
 from manitwin.errors import UsageError
-from manitwin.models.annotators.prior_names import normalised
+from manitwin.models.annotators.prior_names import normalise_name
 from manitwin.twin.record import Language
 
 TEMPLATES: Mapping[str, tuple[str, ...]] = {
@@ -119,13 +119,13 @@ FIXTURES: Mapping[str, frozenset[str]] = {
 """What the templates call the things that stand there for a goal and are none of the objects."""
 
 
-def tells_fixture(predicate: str, others: Iterable[str]) -> bool:
+def is_fixture_unambiguous(predicate: str, others: Iterable[str]) -> bool:
     """Tell whether what a goal's words call its fixture is none of the other objects, by their categories.
 
     Beside a cutting board nobody knows which one "the board" is, nor beside a pen holder "the holder".
     """
     nouns = FIXTURES.get(predicate, frozenset())
-    return not any(nouns & called(normalised(category)) for category in others)
+    return not any(nouns & category_names(normalise_name(category)) for category in others)
 
 
 def goal_instructions(

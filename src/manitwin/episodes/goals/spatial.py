@@ -40,7 +40,7 @@ class Judgement:
     measured: Mapping[str, float]
 
 
-def judged(conditions: Mapping[str, bool], measured: Mapping[str, float]) -> Judgement:
+def judgement_from_conditions(conditions: Mapping[str, bool], measured: Mapping[str, float]) -> Judgement:
     """Return a judgement from ordered conditions: the first that is not met names the failure."""
     failure = next((name for name, met in conditions.items() if not met), None)
     return Judgement(failure is None, failure, {name: float(value) for name, value in measured.items()})
@@ -54,7 +54,7 @@ def beside(state: WorldState, literal: Literal) -> Judgement:
     cosine = float(offset @ SIDES[literal.predicate]) / max(distance_m, 1e-9)
     gap_m = separation_m(moved.footprint_m, other.footprint_m)
     angle_rad = float(np.arccos(np.clip(cosine, -1, 1)))
-    return judged(
+    return judgement_from_conditions(
         {
             "another_side": angle_rad <= SECTOR_RAD,
             "above_it": gap_m > SIDE_GAP_M[0],
@@ -70,7 +70,9 @@ def near(state: WorldState, literal: Literal) -> Judgement:
     assert literal.value is not None
     moved, other = _both(state, literal)
     gap_m = separation_m(moved.footprint_m, other.footprint_m)
-    return judged({"too_far": gap_m <= literal.value, **_set_down(state, literal.subject)}, {"gap_m": gap_m})
+    return judgement_from_conditions(
+        {"too_far": gap_m <= literal.value, **_set_down(state, literal.subject)}, {"gap_m": gap_m}
+    )
 
 
 def away_from(state: WorldState, literal: Literal) -> Judgement:
@@ -78,7 +80,9 @@ def away_from(state: WorldState, literal: Literal) -> Judgement:
     assert literal.value is not None
     moved, other = _both(state, literal)
     gap_m = separation_m(moved.footprint_m, other.footprint_m)
-    return judged({"too_near": gap_m >= literal.value, **_set_down(state, literal.subject)}, {"gap_m": gap_m})
+    return judgement_from_conditions(
+        {"too_near": gap_m >= literal.value, **_set_down(state, literal.subject)}, {"gap_m": gap_m}
+    )
 
 
 def on(state: WorldState, literal: Literal) -> Judgement:
@@ -87,7 +91,7 @@ def on(state: WorldState, literal: Literal) -> Judgement:
     base = other.footprint_m
     outside_m = separation_m(base, moved.center_of_mass_m[None, :2] + _DOT_M)
     strange = state.neighbours(literal.subject) - {literal.second} - state.robots
-    return judged(
+    return judgement_from_conditions(
         {
             "not_touching": state.touch(literal.subject, str(literal.second)),
             "held_by_something_else": not strange,
@@ -115,7 +119,7 @@ def inside(state: WorldState, literal: Literal) -> Judgement:
     off_axis_m = float(np.linalg.norm(moved.center_of_mass_m[:2] - center[:2]))
     below_m = float(center[2] - moved.points_m[:, 2].min())
     touched = state.neighbours(literal.subject) - state.robots
-    return judged(
+    return judgement_from_conditions(
         {
             "turned_over": up >= OPENS_UPWARD,
             "beside_it": off_axis_m <= opening.rim_radius_m,
@@ -130,17 +134,19 @@ def inside(state: WorldState, literal: Literal) -> Judgement:
 
 def upright(state: WorldState, literal: Literal) -> Judgement:
     """Judge that an object's up axis (+Z of its frame) is within 10 degrees of the vertical."""
-    turned_rad = float(np.arccos(np.clip(state.of(literal.subject).object_to_world[2, 2], -1, 1)))
-    return judged({"tilted": turned_rad <= UPRIGHT_RAD, **_set_down(state, literal.subject)}, {"tilt_rad": turned_rad})
+    turned_rad = float(np.arccos(np.clip(state.object_state(literal.subject).object_to_world[2, 2], -1, 1)))
+    return judgement_from_conditions(
+        {"tilted": turned_rad <= UPRIGHT_RAD, **_set_down(state, literal.subject)}, {"tilt_rad": turned_rad}
+    )
 
 
 def lifted(state: WorldState, literal: Literal) -> Judgement:
     """Judge that an object is in the hand, with its centre of mass at least the value above its start."""
     assert literal.value is not None
-    moved = state.of(literal.subject)
+    moved = state.object_state(literal.subject)
     start_m = transform_points(moved.start_object_to_world, moved.body.center_of_mass_m[None])[0, 2]
     rise_m = float(moved.center_of_mass_m[2] - start_m)
-    return judged(
+    return judgement_from_conditions(
         {"not_held": state.is_handled(literal.subject), "too_low": rise_m >= literal.value}, {"rise_m": rise_m}
     )
 
@@ -148,16 +154,16 @@ def lifted(state: WorldState, literal: Literal) -> Judgement:
 def touching(state: WorldState, literal: Literal) -> Judgement:
     """Judge that two objects press on each other."""
     _both(state, literal)
-    return judged({"not_touching": state.touch(literal.subject, str(literal.second))}, {})
+    return judgement_from_conditions({"not_touching": state.touch(literal.subject, str(literal.second))}, {})
 
 
 def undisturbed(state: WorldState, literal: Literal) -> Judgement:
     """Judge that an object has moved by at most 1 cm and turned by at most 5 degrees since the start."""
-    thing = state.of(literal.subject)
+    thing = state.object_state(literal.subject)
     start = transform_points(thing.start_object_to_world, thing.body.center_of_mass_m[None])[0]
     moved_m = float(np.linalg.norm(thing.center_of_mass_m - start))
     turned_rad = rotation_angle_rad(thing.object_to_world[:3, :3] @ thing.start_object_to_world[:3, :3].T)
-    return judged(
+    return judgement_from_conditions(
         {"moved": moved_m <= DISTURBED_M, "turned": turned_rad <= DISTURBED_RAD},
         {"moved_m": moved_m, "turned_rad": turned_rad},
     )
@@ -170,11 +176,11 @@ def pushed_to(state: WorldState, literal: Literal) -> Judgement:
     more than 1 cm.
     """
     assert literal.value is not None and literal.second is not None
-    thing = state.of(literal.subject)
+    thing = state.object_state(literal.subject)
     off_m = float(np.linalg.norm(thing.center_of_mass_m[:2] - state.place(literal.second)[:2]))
     pushes = [each.values for each in state.events if (each.kind, each.subject) == ("pushed", literal.subject)]
     rise_m, way_m = (max((values[name] for values in pushes), default=0.0) for name in ("rise_m", "way_m"))
-    return judged(
+    return judgement_from_conditions(
         {
             "beside_it": off_m <= literal.value,
             "not_touched": bool(pushes),
@@ -192,9 +198,9 @@ _DOT_M = 1e-4 * np.array([[1.0, 0], [-0.5, 0.8], [-0.5, -0.8]])  # a point as a 
 
 def _both(state: WorldState, literal: Literal) -> tuple[ObjectState, ObjectState]:
     assert literal.second is not None
-    return state.of(literal.subject), state.of(literal.second)
+    return state.object_state(literal.subject), state.object_state(literal.second)
 
 
 def _set_down(state: WorldState, name: str) -> dict[str, bool]:
     """Return the conditions of a placed object: released and at rest."""
-    return {"not_released": not state.is_handled(name), "moving": state.of(name).at_rest}
+    return {"not_released": not state.is_handled(name), "moving": state.object_state(name).at_rest}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from manitwin.episodes.goals.goal import Literal
-from manitwin.episodes.goals.spatial import Judgement, judged
+from manitwin.episodes.goals.spatial import Judgement, judgement_from_conditions
 from manitwin.episodes.goals.world_state import Event, WorldState
 
 LEAST_STIRRED = 0.3  # share of the granules moved by more than their own diameter
@@ -20,7 +20,7 @@ def stirred(state: WorldState, literal: Literal) -> Judgement:
     values = _last(state, "stirred", literal)
     if values is None:
         return Judgement(False, "missed", {})
-    return judged(
+    return judgement_from_conditions(
         {"not_all_around": values["sectors"] >= literal.value, "content_still": values["moved"] >= LEAST_STIRRED},
         values,
     )
@@ -32,7 +32,7 @@ def wiped(state: WorldState, literal: Literal) -> Judgement:
     values = _last(state, "wiped", literal)
     if values is None:
         return Judgement(False, "not_touched", {})
-    return judged(
+    return judgement_from_conditions(
         {
             "wrong_face": values["by_face"] >= LEAST_BY_FACE,
             "force_off": values["in_band"] >= LEAST_IN_BAND,
@@ -51,7 +51,7 @@ def cut_motion(state: WorldState, literal: Literal) -> Judgement:
     values = _last(state, "cut_motion", literal)
     if values is None:
         return Judgement(False, "missed", {})
-    return judged(
+    return judgement_from_conditions(
         {"not_along": values["share"] >= literal.value, "not_drawn": values["drawn"] >= literal.value}, values
     )
 
@@ -62,7 +62,7 @@ def aimed(state: WorldState, literal: Literal) -> Judgement:
     values = _last(state, "aimed", literal)
     if values is None:
         return Judgement(False, "missed", {})
-    return judged(
+    return judgement_from_conditions(
         {
             "too_near": values["distance_m"] >= AIMED_M[0],
             "too_far": values["distance_m"] <= AIMED_M[1],

@@ -124,7 +124,7 @@ class WorldState:
     holders: Mapping[str, Holder] = field(default_factory=dict)
     arms: tuple[str, ...] = ()
 
-    def of(self, name: str) -> ObjectState:
+    def object_state(self, name: str) -> ObjectState:
         """Return an object's state; raises UsageError naming the existing objects."""
         return self._named(self.objects, name, "object")
 

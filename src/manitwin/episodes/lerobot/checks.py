@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from manitwin.episodes.film import Film
-from manitwin.episodes.lerobot.lerobot_format import STATISTICS, TIMESTAMP_TOLERANCE_S, arrays_of, place_of
+from manitwin.episodes.lerobot.lerobot_format import STATISTICS, TIMESTAMP_TOLERANCE_S, arrays_of, chunk_and_file
+from manitwin.episodes.video_reading import VideoReader
 from manitwin.errors import EpisodesError
 from manitwin.formats.json_file import read_json_object
 from manitwin.formats.parquet_file import read_parquet
@@ -46,7 +46,7 @@ def _shape(feature: dict[str, Any]) -> tuple[int, ...]:
     return (3, 1, 1) if feature["dtype"] == "video" else tuple(feature["shape"])
 
 
-def checked_frames(
+def check_data_files(
     root: Path,
     info: dict[str, Any],
     tasks: Sequence[str],
@@ -59,7 +59,7 @@ def checked_frames(
     for row in rows:
         by_file.setdefault((row["data/chunk_index"], row["data/file_index"]), []).append(row)
     wanted = [root / info["data_path"].format(chunk_index=chunk, file_index=file) for chunk, file in by_file]
-    if files != wanted or list(by_file) != [place_of(number) for number in range(len(files))]:
+    if files != wanted or list(by_file) != [chunk_and_file(number) for number in range(len(files))]:
         odd = sorted(set(files) ^ set(wanted)) or files or [root / "data"]
         raise EpisodesError(
             f"{odd[0]}: the data files do not match those named by the episodes, in their order; {_REMEDY}"
@@ -211,7 +211,7 @@ def _check_camera(
         spans.setdefault(file, []).append((begin, end, row["episode_index"]))
     present = sorted((root / "videos" / key).glob("*/*.mp4"))
     wanted = [root / info["video_path"].format(video_key=key, chunk_index=c, file_index=f) for c, f in sorted(spans)]
-    if present != wanted or sorted(spans) != [place_of(number) for number in range(len(spans))]:
+    if present != wanted or sorted(spans) != [chunk_and_file(number) for number in range(len(spans))]:
         odd = sorted(set(present) ^ set(wanted)) or wanted
         raise EpisodesError(f"{odd[0]}: the files of {key} are not those that the episodes name; {_REMEDY}")
     for path, (_, clips) in zip(wanted, sorted(spans.items()), strict=True):
@@ -221,7 +221,7 @@ def _check_camera(
 def _check_file(
     path: Path, feature: dict[str, Any], fps: int, clips: list[tuple[float, float, int]], decode: bool
 ) -> None:
-    with Film(path) as film:
+    with VideoReader(path) as film:
         facts = film.facts
         frames = sum(1 for _ in film) if decode else facts.frames
     if abs(facts.rate_hz - fps) > 1e-6 * fps or [facts.height_px, facts.width_px] != feature["shape"][:2]:

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from manitwin.episodes.attempts import Attempt
 from manitwin.episodes.lerobot.feature_statistics import Statistics
 from manitwin.episodes.lerobot.frame_features import Feature
-from manitwin.episodes.lerobot.lerobot_format import EPISODES_PATH, QUANTILES, STATISTICS, place_of
+from manitwin.episodes.lerobot.lerobot_format import EPISODES_PATH, QUANTILES, STATISTICS, chunk_and_file
 
 FACTS: dict[str, pa.DataType] = {
     "episode_id": pa.string(),
@@ -54,7 +54,7 @@ class EpisodeRows:
         """Append a row."""
         if self._writer is None:
             self._open()
-        chunk, file = place_of(self._files - 1)
+        chunk, file = chunk_and_file(self._files - 1)
         whole = {**row, "meta/episodes/chunk_index": chunk, "meta/episodes/file_index": file}
         whole |= {name: getattr(attempt, name) for name in FACTS}
         whole |= {f"stats/{feature}/{name}": said[name] for feature, said in statistics.items() for name in STATISTICS}
@@ -84,7 +84,7 @@ class EpisodeRows:
             self._writer = None
 
     def _open(self) -> None:
-        chunk, file = place_of(self._files)
+        chunk, file = chunk_and_file(self._files)
         path = self.root / EPISODES_PATH.format(chunk_index=chunk, file_index=file)
         path.parent.mkdir(parents=True, exist_ok=True)
         self._stream = path.open("wb")

@@ -41,7 +41,7 @@ def episode_statistics(columns: dict[str, np.ndarray]) -> dict[str, Statistics]:
     return result
 
 
-class Pooled:
+class PooledStatistics:
     """Mean, variance and bounds of a feature, accumulated over episodes.
 
     Source: T. F. Chan, G. H. Golub, R. J. LeVeque, Updating formulae and a pairwise algorithm for computing sample variances,
@@ -77,7 +77,7 @@ class Pooled:
 
 
 def quantiles_of_files(
-    files: Iterable[Path], features: Sequence[Feature], pooled: dict[str, Pooled]
+    files: Iterable[Path], features: Sequence[Feature], pooled: dict[str, PooledStatistics]
 ) -> dict[str, np.ndarray]:
     """Return the quantiles ``(5, width)`` of each feature over data files, with one file in memory at a time."""
     counts = {f.name: np.zeros((f.width, BINS), np.int64) for f in features}
@@ -95,7 +95,7 @@ def quantiles_of_files(
     return {name: _quantiles(rows, pooled[name]) for name, rows in counts.items()}
 
 
-def _quantiles(counts: np.ndarray, pooled: Pooled) -> np.ndarray:
+def _quantiles(counts: np.ndarray, pooled: PooledStatistics) -> np.ndarray:
     result = np.empty((len(QUANTILES), len(counts)))
     for dimension, row in enumerate(counts):
         below = np.concatenate([[0], np.cumsum(row)])

@@ -40,7 +40,7 @@ TIMESTAMP_TOLERANCE_S = 1e-4
 """Largest deviation of a timestamp from the frame grid that LeRobot accepts (``tolerance_s`` of LeRobotDataset)."""
 
 
-def place_of(number: int) -> tuple[int, int]:
+def chunk_and_file(number: int) -> tuple[int, int]:
     """Return the chunk of the n-th file, and its number in the chunk."""
     return divmod(number, CHUNKS_SIZE)
 

@@ -17,9 +17,9 @@ import pyarrow.compute as pc
 
 from manitwin.episodes.lerobot.checks import (
     EpisodeStatistics,
+    check_data_files,
     check_statistics,
     check_videos,
-    checked_frames,
     statistics_of,
 )
 from manitwin.episodes.lerobot.lerobot_format import (
@@ -33,7 +33,7 @@ from manitwin.episodes.lerobot.lerobot_format import (
     VERSION,
     VIDEO_PATH,
     arrays_of,
-    place_of,
+    chunk_and_file,
 )
 from manitwin.errors import EpisodesError
 from manitwin.formats.json_file import parse_json_object, read_json_object
@@ -95,7 +95,7 @@ def read_lerobot(root: Path, *, decode_videos: bool = False) -> LeRobotSet:
     episodes, statistics = _episodes(root, info, set(tasks))
     found = LeRobotSet(root, info, tasks, episodes)
     frames = 0
-    for count in checked_frames(root, info, tasks, episodes, statistics):
+    for count in check_data_files(root, info, tasks, episodes, statistics):
         frames += count
     if frames != info["total_frames"]:
         raise _wrong(root / INFO, f"total_frames is {info['total_frames']}, but there are {frames}")
@@ -162,7 +162,7 @@ def _tasks(path: Path, total: int) -> tuple[str, ...]:
 def _episode_tables(root: Path) -> Iterator[tuple[Path, int, pa.Table]]:
     files = sorted((root / "meta" / "episodes").glob("*/*.parquet"))
     for number, path in enumerate(files):
-        chunk, file = place_of(number)
+        chunk, file = chunk_and_file(number)
         if path != root / EPISODES_PATH.format(chunk_index=chunk, file_index=file):
             raise _wrong(path, f"the {number + 1}th file of episodes should be chunk {chunk}, file {file}")
         yield path, number, read_parquet(path, EpisodesError, remedy=_REMEDY, inside=root)
@@ -192,7 +192,7 @@ def _episodes(
                 raise _wrong(
                     path, f"{where} stands where episode {len(rows)} should be: LeRobot finds episodes by their place"
                 )
-            if (row["meta/episodes/chunk_index"], row["meta/episodes/file_index"]) != place_of(number):
+            if (row["meta/episodes/chunk_index"], row["meta/episodes/file_index"]) != chunk_and_file(number):
                 raise _wrong(path, f"{where} says that it is in another file")
             if row["dataset_from_index"] != end or row["dataset_to_index"] - end != row["length"] or row["length"] < 1:
                 raise _wrong(

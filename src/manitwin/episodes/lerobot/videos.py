@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.episodes.film import Film, VideoFacts, video_facts
 from manitwin.episodes.lerobot.feature_statistics import Statistics
-from manitwin.episodes.lerobot.lerobot_format import CODEC, QUANTILES, VIDEO_PATH, place_of, video_key
+from manitwin.episodes.lerobot.lerobot_format import CODEC, QUANTILES, VIDEO_PATH, chunk_and_file, video_key
+from manitwin.episodes.video_reading import VideoFacts, VideoReader, video_facts
 from manitwin.errors import EpisodesError
 
 _ENCODED_BY_LEROBOT = ("av1", "h264", "hevc")
@@ -65,7 +65,7 @@ class VideoColumns:
                 f"{clip.file}: {self._frames[clip.file]} frames, but episode {episode_id} is at {clip.first_frame} and has"
                 f" {steps}; render the pictures again"
             )
-        chunk, place = place_of(number)
+        chunk, place = chunk_and_file(number)
         prefix = f"videos/{self.key}"
         columns = {
             f"{prefix}/chunk_index": chunk,
@@ -114,7 +114,7 @@ class VideoColumns:
         if (facts.height_px, facts.width_px, facts.codec) != (first.height_px, first.width_px, first.codec):
             raise EpisodesError(f"{file}: {facts} differs from the camera's other files, {first}; render them alike")
         number = len(self.numbers)
-        chunk, place = place_of(number)
+        chunk, place = chunk_and_file(number)
         target = self.root / VIDEO_PATH.format(video_key=self.key, chunk_index=chunk, file_index=place)
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(file, target)
@@ -127,7 +127,7 @@ class _ClipReader:
 
     def __init__(self) -> None:
         self._file: Path | None = None
-        self._film: Film | None = None
+        self._film: VideoReader | None = None
 
     def statistics(self, clip: Clip, steps: int) -> Statistics:
         """Return the statistics ``(3, 1, 1)`` of an episode's pictures, RGB between 0 and 1."""
@@ -144,9 +144,9 @@ class _ClipReader:
         }
         return {"count": [len(pictures)], **{name: row.reshape(3, 1, 1).tolist() for name, row in rows.items()}}
 
-    def _opened(self, file: Path) -> Film:
+    def _opened(self, file: Path) -> VideoReader:
         if self._film is None or self._file != file:
             if self._film is not None:
                 self._film.close()
-            self._file, self._film = file, Film(file)
+            self._file, self._film = file, VideoReader(file)
         return self._film

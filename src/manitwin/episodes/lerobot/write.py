@@ -13,8 +13,9 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from manitwin.episodes.downsampling import downsample
 from manitwin.episodes.lerobot.episode_rows import EpisodeRows
-from manitwin.episodes.lerobot.feature_statistics import Pooled, episode_statistics, quantiles_of_files
+from manitwin.episodes.lerobot.feature_statistics import PooledStatistics, episode_statistics, quantiles_of_files
 from manitwin.episodes.lerobot.frame_features import Feature, features_of, frames_of, schema_of, table_of
 from manitwin.episodes.lerobot.lerobot_format import (
     CHUNKS_SIZE,
@@ -26,15 +27,14 @@ from manitwin.episodes.lerobot.lerobot_format import (
     VERSION,
     VIDEO_FILES_SIZE_IN_MB,
     VIDEO_PATH,
-    place_of,
+    chunk_and_file,
     write_json,
 )
 from manitwin.episodes.lerobot.videos import CameraVideos, VideoColumns
-from manitwin.episodes.lower_rates import at_rate
 from manitwin.episodes.recording import RATE_HZ
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.errors import EpisodesError
-from manitwin.twin.store import folder_beside
+from manitwin.twin.store import atomic_folder
 
 
 @dataclass(frozen=True)
@@ -60,29 +60,29 @@ def write_lerobot(
 
     Every instruction is a task; ``seed`` and the episode's id select the one assigned to its frames. With ``videos`` each
     episode must have pictures of every camera. With ``granules`` frames contain granule counts (zeros for an episode
-    without). Frames, and pictures, are at ``rate_hz`` per second (``at_rate``).
+    without). Frames, and pictures, are at ``rate_hz`` per second (``downsample``).
 
     One episode is in memory at a time. The output is deterministic to the byte. Raises EpisodesError for no episode, several
     robots, an episode without instructions, and pictures that do not match.
     """
-    with folder_beside(place) as root:
-        writer: _Set | None = None
+    with atomic_folder(place) as root:
+        writer: _DatasetWriter | None = None
         with ExitStack() as stack:
             for episode in episodes:
                 if writer is None:
                     columns = [VideoColumns(camera, root, rate_hz) for camera in videos]
-                    opened = _Set(root, episode, seed, data_files_size_in_mb, columns, granules, rate_hz)
+                    opened = _DatasetWriter(root, episode, seed, data_files_size_in_mb, columns, granules, rate_hz)
                     writer = stack.enter_context(opened)
                 writer.add(episode)
         if writer is None:
             raise EpisodesError(
                 f"{place}: there is no episode, and LeRobot cannot read an empty set; keep at least one episode"
             )
-        writer.describe()
+        writer.write_metadata()
         return LeRobotSummary(writer.rows.count, writer.frames, len(writer.tasks))
 
 
-class _Set:
+class _DatasetWriter:
     """A data set being written."""
 
     def __init__(
@@ -104,9 +104,9 @@ class _Set:
         self.rows = EpisodeRows(root, self.features, keys, data_files_size_in_mb)
         self.tasks: dict[str, int] = {}
         self.frames = 0
-        self.pooled: dict[str, Pooled] = {}
+        self.pooled: dict[str, PooledStatistics] = {}
 
-    def __enter__(self) -> _Set:
+    def __enter__(self) -> _DatasetWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -115,7 +115,7 @@ class _Set:
 
     def add(self, episode: StoredEpisode) -> None:
         """Write an episode's frames and its row."""
-        episode = replace(episode, recording=at_rate(episode.recording, self.rate_hz))
+        episode = replace(episode, recording=downsample(episode.recording, self.rate_hz))
         attempt, steps = episode.attempt, episode.recording.steps
         if episode.robot != self.robot:
             raise EpisodesError(
@@ -151,10 +151,10 @@ class _Set:
             if name in self.pooled:
                 self.pooled[name].add(of_episode)
             else:
-                self.pooled[name] = Pooled(of_episode)
+                self.pooled[name] = PooledStatistics(of_episode)
         self.frames += steps
 
-    def describe(self) -> None:
+    def write_metadata(self) -> None:
         """Write the files that describe the whole set, info.json last."""
         quantiles = quantiles_of_files(self.data.files, self.features, self.pooled)
         quantiles |= {column.key: self.rows.mean_quantiles(column.key) for column in self.videos}
@@ -203,7 +203,7 @@ class _DataFiles:
             if size + size / self._episodes > self.most_bytes:
                 self.close()
         if self._writer is None:
-            chunk, file = place_of(len(self.files))
+            chunk, file = chunk_and_file(len(self.files))
             path = self.root / DATA_PATH.format(chunk_index=chunk, file_index=file)
             path.parent.mkdir(parents=True, exist_ok=True)
             self._stream = path.open("wb")
@@ -212,7 +212,7 @@ class _DataFiles:
             self._episodes = 0
         self._writer.write_table(table)
         self._episodes += 1
-        return place_of(len(self.files) - 1)
+        return chunk_and_file(len(self.files) - 1)
 
     def close(self) -> None:
         """Finish the current file."""

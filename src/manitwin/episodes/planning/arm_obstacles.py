@@ -10,7 +10,7 @@ import trimesh
 from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.poses import transform_points
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody
-from manitwin.robots.links import Link, LinkShape, links_of_urdf, poses_at
+from manitwin.robots.links import Link, LinkShape, poses_at, read_urdf_links
 from manitwin.robots.robot import Robot
 
 
@@ -19,7 +19,7 @@ class ArmObstacles:
 
     def __init__(self, arm: Robot):
         """Take the shapes of the arm's links."""
-        self._arm, self._links = arm, links_of_urdf(arm.urdf)
+        self._arm, self._links = arm, read_urdf_links(arm.urdf)
         self._bodies = {link.name: _body_of(link) for link in self._links if link.shapes}
 
     def at(self, joints_rad: np.ndarray, openings_m: Sequence[float]) -> tuple[PlacedObject, ...]:

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
-from manitwin.episodes.planning.arm_solutions import ArmSolutions, KnownPoses
+from manitwin.episodes.planning.arm_solutions import ArmSolutions, SampledPoses
 from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.convex_shapes import ShapeStore
-from manitwin.episodes.planning.grasp_candidates import GraspCandidates, HandRoom, turns_of
+from manitwin.episodes.planning.grasp_candidates import GraspCandidates, HandVertices, equivalent_rotations
 from manitwin.episodes.planning.hand_shaping import HandShaping
 from manitwin.episodes.planning.kinematic_body import floating_hand_of
 from manitwin.episodes.planning.motions import Motions
@@ -39,15 +39,15 @@ class ArmPlanning:
         self.robot, self.timestep_s, self.settings = robot, timestep_s, settings or PlannerSettings()
         self.arm = ArmKinematics(robot, opening_m)
         self.hand = floating_hand_of(self.arm.body)
-        self.known, self.ends = KnownPoses(self.arm), LineEnds(self.settings)
+        self.known, self.ends = SampledPoses(self.arm), LineEnds(self.settings)
         self._shaping: tuple[HandShaping, HandShaping] | None = None
         if isinstance(robot.gripper, MultiFingerGripper):
             bodies = self.arm.body, self.hand
             first, second = (HandShaping(body, robot.gripper, robot.open_hand) for body in bodies)
             self._shaping = first, second
         moving = frozenset[int]() if self._shaping is None else self._shaping[1].moving
-        turns = turns_of(robot.gripper)
-        self.candidates = GraspCandidates(HandRoom(self.hand, moving), self.known, self.settings, turns)
+        turns = equivalent_rotations(robot.gripper)
+        self.candidates = GraspCandidates(HandVertices(self.hand, moving), self.known, self.settings, turns)
         self.solutions = ArmSolutions(self.arm, self.known, self.settings)
         self.motions = Motions(robot, self.arm, timestep_s, self.settings)
         self._shapes = ShapeStore()
@@ -55,12 +55,12 @@ class ArmPlanning:
         self._standing = standing
         self._asked: tuple[PickPlaceProblem | None, PickPlaceProblem | None] = None, None
 
-    def world_of(
+    def problem_world(
         self, problem: PickPlaceProblem, goal_object_to_world: np.ndarray, *, as_hulls: bool = False
     ) -> ProblemWorld:
         """Return the world of a problem; the last one is cached for replanning."""
         problem, last = self._with_standing(problem), self._world
-        if last is None or not last.is_of(problem, goal_object_to_world, as_hulls=as_hulls):
+        if last is None or not last.is_built_for(problem, goal_object_to_world, as_hulls=as_hulls):
             self._world = last = ProblemWorld(
                 problem,
                 goal_object_to_world,

@@ -20,7 +20,7 @@ SEED = 0
 SAME_SOLUTION_RAD = 0.05
 
 
-class KnownPoses:
+class SampledPoses:
     """Sampled configurations of an arm without self-collision, half of them near home, with their gripper poses."""
 
     def __init__(self, arm: ArmKinematics):
@@ -35,7 +35,7 @@ class KnownPoses:
         free = _without_self_collision(arm.body, samples)
         self._samples, self._features = samples[free], _features(poses[free])
 
-    def out_of_reach(self, gripper_to_world: np.ndarray) -> bool:
+    def is_out_of_reach(self, gripper_to_world: np.ndarray) -> bool:
         """Tell whether a pose is farther from the shoulder than any sample."""
         return float(np.linalg.norm(gripper_to_world[:3, 3] - self._shoulder)) > self._reach_m
 
@@ -73,11 +73,11 @@ def _without_self_collision(body: KinematicBody, samples: np.ndarray) -> np.ndar
 class ArmSolutions:
     """Inverse kinematics started from a given configuration, then from known configurations with nearby poses."""
 
-    def __init__(self, arm: ArmKinematics, known: KnownPoses, settings: PlannerSettings):
+    def __init__(self, arm: ArmKinematics, known: SampledPoses, settings: PlannerSettings):
         """Take the arm, its known poses and the settings."""
         self._arm, self._known, self._settings = arm, known, settings
 
-    def of(
+    def solve(
         self, world: CollisionWorld, phase: Phase, gripper_to_world: np.ndarray, near: np.ndarray
     ) -> tuple[list[np.ndarray], bool]:
         """Return collision-free configurations of a pose, nearest to ``near`` first, and whether any solution converged."""

@@ -227,7 +227,9 @@ class ProblemWorld:
         self._hand = CollisionWorld(hand, shapes, margin_m=settings.margin_m, clearance_m=settings.clearance_m)
         self._shapings = shaping
 
-    def is_of(self, problem: PickPlaceProblem, goal_object_to_world: np.ndarray, *, as_hulls: bool = False) -> bool:
+    def is_built_for(
+        self, problem: PickPlaceProblem, goal_object_to_world: np.ndarray, *, as_hulls: bool = False
+    ) -> bool:
         """Tell whether this world was built for this problem object, goal and ``as_hulls``."""
         same = self.problem is problem and self._as_hulls == as_hulls
         return same and np.array_equal(self.goal_object_to_world, goal_object_to_world)

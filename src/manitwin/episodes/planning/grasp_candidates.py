@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from manitwin.episodes.planning.arm_solutions import KnownPoses
+from manitwin.episodes.planning.arm_solutions import SampledPoses
 from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.convex_shapes import corners_of
 from manitwin.episodes.planning.kinematic_body import KinematicBody
@@ -24,7 +24,7 @@ CLOSED = (0.15, 0.3, 0.5)  # fractions of the closing motion: the object stops t
 QUARTER_TURN = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 
 
-def turns_of(gripper: Gripper) -> np.ndarray:
+def equivalent_rotations(gripper: Gripper) -> np.ndarray:
     """Return the rotations about the approach axis ``(K, 4, 4)`` that leave a grasp equivalent.
 
     Jaws are interchangeable, a cup is round (with a square body), and fingers of a multi-finger hand are all different.
@@ -34,7 +34,7 @@ def turns_of(gripper: Gripper) -> np.ndarray:
     return np.array([np.eye(4), HALF_TURN] if isinstance(gripper, ParallelGripper) else [np.eye(4)])
 
 
-class HandRoom:
+class HandVertices:
     """Vertices of a hand's shapes in the grasp frame, for a fast test against boxes.
 
     The test is necessary but not sufficient: a hand that passes may still overlap a box with an edge.
@@ -62,7 +62,7 @@ class HandRoom:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class GraspCandidate:
     """A pose ``gripper_to_object (4, 4)`` of grasp ``index``, and why the hand cannot be there, if so."""
 
     index: int
@@ -73,13 +73,13 @@ class Candidate:
 class GraspCandidates:
     """Checks grasps with the hand alone, which is cheap compared with any motion of the arm."""
 
-    def __init__(self, room: HandRoom, known: KnownPoses, settings: PlannerSettings, turns: np.ndarray):
+    def __init__(self, room: HandVertices, known: SampledPoses, settings: PlannerSettings, turns: np.ndarray):
         """Take hand and reach models, and the equivalent rotations ``turns (K, 4, 4)`` of a grasp."""
         self.turns = turns
         self._room, self._known, self._settings = room, known, settings
         self._ends = LineEnds(settings)
 
-    def of(self, world: ProblemWorld) -> Iterator[Candidate]:
+    def check_grasps(self, world: ProblemWorld) -> Iterator[GraspCandidate]:
         """Yield all turns of each grasp; the world's hand has the grasp's shape at that time."""
         grasps = world.problem.grasps
         if not grasps:
@@ -96,10 +96,10 @@ class GraspCandidates:
                 elif at_goal[index, turn]:
                     failure = "lower_blocked"
                 else:
-                    failure = self.first_look(world, poses[index, turn])
+                    failure = self.hand_failure(world, poses[index, turn])
                     if failure is None and grasps[index].joints_rad is not None:
                         failure = self._look_at_closing(world, grasps[index], poses[index, turn])
-                yield Candidate(index, poses[index, turn], failure)
+                yield GraspCandidate(index, poses[index, turn], failure)
 
     def _without_room(self, world: ProblemWorld, gripper_to_world: np.ndarray) -> np.ndarray:
         flat = gripper_to_world.reshape(-1, 4, 4)
@@ -107,24 +107,24 @@ class GraspCandidates:
         inside = self._room.is_inside(flat, boxes, self._settings.clearance_m)
         return inside.reshape(gripper_to_world.shape[:2])
 
-    def first_look(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
+    def hand_failure(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
         """Return why a pose is infeasible: out of reach, or the hand collides at the ends of its straight lines; or None.
 
         The world then holds the target in this pose.
         """
         world.hold(gripper_to_object)
-        failure = self.look_at_approach(world, gripper_to_object)
+        failure = self.approach_failure(world, gripper_to_object)
         if failure is not None:
             return failure
         grasped = world.problem.target.object_to_world @ gripper_to_object
-        if not world.is_hand_free(Phase.LIFT, grasped, self._ends.above(grasped)):
+        if not world.is_hand_free(Phase.LIFT, grasped, self._ends.lift_end(grasped)):
             return "lift_blocked"
         placed = world.goal_object_to_world @ gripper_to_object
-        if self._known.out_of_reach(placed):
+        if self._known.is_out_of_reach(placed):
             return "place_unreachable"
-        if not world.is_hand_free(Phase.LOWER, placed, self._ends.above(placed)):
+        if not world.is_hand_free(Phase.LOWER, placed, self._ends.lift_end(placed)):
             return "lower_blocked"
-        if not world.is_hand_free(Phase.RETREAT, placed, self._ends.before(placed)):
+        if not world.is_hand_free(Phase.RETREAT, placed, self._ends.approach_start(placed)):
             return "retreat_blocked"
         return None
 
@@ -139,11 +139,11 @@ class GraspCandidates:
         world.shape_hand(grasp)
         return None
 
-    def look_at_approach(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
+    def approach_failure(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
         """Return why a pose cannot be approached: out of reach, or the hand collides at an end of the line; or None."""
         grasped = world.problem.target.object_to_world @ gripper_to_object
-        if self._known.out_of_reach(grasped):
+        if self._known.is_out_of_reach(grasped):
             return "outside_workspace"
-        if not world.is_hand_free(Phase.APPROACH, grasped, self._ends.before(grasped)):
+        if not world.is_hand_free(Phase.APPROACH, grasped, self._ends.approach_start(grasped)):
             return "approach_blocked"
         return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from manitwin.episodes.planning.problem import PlanFailure, later
+from manitwin.episodes.planning.problem import PlanFailure, later_failure
 
 
 @dataclass
@@ -33,12 +33,12 @@ class GraspTally:
         """Tell whether a grasp has not been tried beyond the check of the hand alone."""
         return index not in self.beyond_a_look
 
-    def count(self, index: int, failure: PlanFailure) -> None:
+    def record_failure(self, index: int, failure: PlanFailure) -> None:
         """Count a failed attempt of a grasp."""
         self.tried.add(index)
-        self.failures[index] = later(failure, self.failures.get(index, failure))
+        self.failures[index] = later_failure(failure, self.failures.get(index, failure))
 
-    def succeed(self, index: int) -> None:
+    def record_success(self, index: int) -> None:
         """Count the planned grasp."""
         self.failures.pop(index, None)
         self.tried.add(index)

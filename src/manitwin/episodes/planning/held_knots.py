@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from manitwin.episodes.planning.arm_planning import ArmPlanning
 from manitwin.episodes.planning.collision_world import STANDING, ProblemWorld
 from manitwin.episodes.planning.path_timing import joint_spline
-from manitwin.episodes.planning.problem import Phase, PlanFailure, later
+from manitwin.episodes.planning.problem import Phase, PlanFailure, later_failure
 
 STARTS = 4  # known configurations from which the first pose is solved
 LARGEST_KNOT_RAD = 0.6  # a larger change between knots is a jump to another branch
@@ -41,7 +41,7 @@ class HeldKnots:
         """Take the models of an arm, and the phase of the collision filter: CARRY, or REACH of an empty hand."""
         self._parts, self._phase = parts, phase
 
-    def follow(
+    def solve_path(
         self,
         world: ProblemWorld,
         path: HeldPath,
@@ -56,9 +56,9 @@ class HeldKnots:
         """
         if not self.is_hand_free(world, path, gripper_to_object, spare_m):
             return "path_blocked"
-        return self.joints_of(world, path, gripper_to_object, near_rad, spare_m)
+        return self.solve_joints(world, path, gripper_to_object, near_rad, spare_m)
 
-    def joints_of(
+    def solve_joints(
         self,
         world: ProblemWorld,
         path: HeldPath,
@@ -68,7 +68,7 @@ class HeldKnots:
     ) -> CubicSpline | PlanFailure:
         """Do the same as ``follow`` for a path along which the hand is known to be free."""
         parts, hands = self._parts, path.poses @ gripper_to_object
-        if any(parts.known.out_of_reach(hands[k]) for k in (0, len(hands) // 2, -1)):
+        if any(parts.known.is_out_of_reach(hands[k]) for k in (0, len(hands) // 2, -1)):
             return "path_unreachable"
         failure: PlanFailure = "path_unreachable"
         seen: list[np.ndarray] = []
@@ -80,7 +80,7 @@ class HeldKnots:
             knots = self._begin(world, path, hands, first, spare_m)
             if isinstance(knots, np.ndarray):
                 return joint_spline(knots)
-            failure = later(failure, knots)
+            failure = later_failure(failure, knots)
         return failure
 
     def is_hand_free(
@@ -93,12 +93,16 @@ class HeldKnots:
         hands, margin_m = path.poses @ gripper_to_object, self._parts.settings.clearance_m
         return all(
             world.is_hand_free(
-                self._phase, hands[number], margin_m=margin_m, meant=_meant(world, path, number), spare_m=spare_m
+                self._phase,
+                hands[number],
+                margin_m=margin_m,
+                meant=_allowed_contacts(world, path, number),
+                spare_m=spare_m,
             )
             for number in reversed(range(len(hands)))
         )
 
-    def onward(
+    def continue_knots(
         self,
         world: ProblemWorld,
         path: HeldPath,
@@ -129,13 +133,13 @@ class HeldKnots:
         self._enter(world, path, 0, spare_m)
         if not world.arm.is_free(first_rad):
             return "path_blocked"
-        return self.onward(world, path.part(1, len(path.poses)), hands[1:], [first_rad], spare_m=spare_m)
+        return self.continue_knots(world, path.part(1, len(path.poses)), hands[1:], [first_rad], spare_m=spare_m)
 
     def _enter(self, world: ProblemWorld, path: HeldPath, number: int, spare_m: float) -> None:
-        world.arm.enter(self._phase, self._parts.settings.clearance_m, _meant(world, path, number), spare_m)
+        world.arm.enter(self._phase, self._parts.settings.clearance_m, _allowed_contacts(world, path, number), spare_m)
 
 
-def _meant(world: ProblemWorld, path: HeldPath, number: int) -> frozenset[str]:
+def _allowed_contacts(world: ProblemWorld, path: HeldPath, number: int) -> frozenset[str]:
     """Return the names of the bodies that may be touched at a knot of a path."""
     meant = path.meant if number >= path.meant_from else frozenset[str]()
     return meant | {STANDING} if world.problem.target.name in meant else meant

@@ -20,7 +20,15 @@ from manitwin.episodes.planning.grasp_tally import GraspTally
 from manitwin.episodes.planning.held_knots import HeldKnots, HeldPath
 from manitwin.episodes.planning.level_space import LEVEL_RAD, LevelSpace, tilts_rad
 from manitwin.episodes.planning.path_timing import joint_spline, time_quintic
-from manitwin.episodes.planning.problem import Grasp, Motion, Phase, PickPlaceProblem, PlanFailure, PlanReport, later
+from manitwin.episodes.planning.problem import (
+    Grasp,
+    Motion,
+    Phase,
+    PickPlaceProblem,
+    PlanFailure,
+    PlanReport,
+    later_failure,
+)
 from manitwin.geometry.poses import transform
 
 FROM_WHERE_IT_IS_RAD = 0.9  # to the first knot from the arm's current joints
@@ -85,10 +93,10 @@ class HeldPathPlanner:
         Pairs are tried with ``SPARE_M`` of clearance around the arm, because the target's pose in the hand is never exact,
         then without. The report contains no plan, only the number of grasps tried and their failures.
         """
-        world = self.parts.world_of(problem, problem.target.object_to_world, as_hulls=as_hulls)
+        world = self.parts.problem_world(problem, problem.target.object_to_world, as_hulls=as_hulls)
         rng, tally, pairs = np.random.default_rng(problem.seed), GraspTally(), 0
         tight = list[tuple[int, np.ndarray, HeldPath]]()
-        for candidate in self.parts.candidates.of(world):
+        for candidate in self.parts.candidates.check_grasps(world):
             failure: PlanFailure | None = candidate.failure
             if failure is None and self._accepts is not None:
                 failure = self._look_at_lift(world, candidate.gripper_to_object)
@@ -98,30 +106,30 @@ class HeldPathPlanner:
             world.hold(candidate.gripper_to_object)
             for path in paths if failure is None else ():
                 if not self._knots.is_hand_free(world, path, candidate.gripper_to_object):
-                    failure = "path_blocked" if failure is None else later(failure, "path_blocked")
+                    failure = "path_blocked" if failure is None else later_failure(failure, "path_blocked")
                     continue
                 pairs += 1
                 pair = candidate.index, candidate.gripper_to_object, path
                 outcome = self._plan_pair(world, *pair, longest_s, rng, SPARE_M)
                 if isinstance(outcome, HeldPlan):
-                    tally.succeed(candidate.index)
+                    tally.record_success(candidate.index)
                     return outcome, PlanReport(None, tally.count_tried, tally.reasons)
                 if outcome is None:
                     tight.append(pair)
                     outcome = "path_blocked"
-                failure = outcome if failure is None else later(failure, outcome)
+                failure = outcome if failure is None else later_failure(failure, outcome)
                 if pairs == MOST_PAIRS:
                     break
-            tally.count(candidate.index, failure or "path_unreachable")
+            tally.record_failure(candidate.index, failure or "path_unreachable")
             if pairs == MOST_PAIRS:
                 break
         for index, gripper_to_object, path in tight:
             world.shape_hand(problem.grasps[index])
             outcome = self._plan_pair(world, index, gripper_to_object, path, longest_s, rng)
             if isinstance(outcome, HeldPlan):
-                tally.succeed(index)
+                tally.record_success(index)
                 return outcome, PlanReport(None, tally.count_tried, tally.reasons)
-            tally.count(index, outcome or "path_blocked")
+            tally.record_failure(index, outcome or "path_blocked")
         return None, PlanReport(None, tally.count_tried, tally.reasons)
 
     def plan_empty(
@@ -144,14 +152,14 @@ class HeldPathPlanner:
         start = self.parts.arm.home if start_rad is None else np.asarray(start_rad, float)
         rng, failures = np.random.default_rng(problem.seed), list[PlanFailure]()
         for path in paths:
-            world = self.parts.world_of(pushed, pushed.target.object_to_world)
-            joints = self._knots.follow(world, path, np.eye(4), start)
+            world = self.parts.problem_world(pushed, pushed.target.object_to_world)
+            joints = self._knots.solve_path(world, path, np.eye(4), start)
             if isinstance(joints, CubicSpline):
                 if self._shortest_s(joints) > longest_s:
                     failures.append("path_slow")
                     continue
-                world = self.parts.world_of(problem, problem.target.object_to_world)
-                reach = self.parts.motions.free(world.arm, Phase.REACH, start, joints(0.0), rng)
+                world = self.parts.problem_world(problem, problem.target.object_to_world)
+                reach = self.parts.motions.plan_free(world.arm, Phase.REACH, start, joints(0.0), rng)
                 if isinstance(reach, Motion):
                     return reach, path, joints
                 failures.append(reach)
@@ -159,7 +167,7 @@ class HeldPathPlanner:
                 failures.append(joints)
         return failures
 
-    def again(
+    def replan(
         self,
         problem: PickPlaceProblem,
         paths: Sequence[HeldPath],
@@ -174,19 +182,19 @@ class HeldPathPlanner:
 
         ``near_rad`` is the previous start of the path. Returns None if no path is feasible.
         """
-        world = self.parts.world_of(problem, problem.target.object_to_world, as_hulls=as_hulls)
+        world = self.parts.problem_world(problem, problem.target.object_to_world, as_hulls=as_hulls)
         world.hold(gripper_to_object)
         rng = np.random.default_rng((problem.seed, 2))
         for path in paths:
-            joints = self._knots.follow(world, path, gripper_to_object, near_rad)
-            if not isinstance(joints, CubicSpline) or self._drawback(world, joints, longest_s):
+            joints = self._knots.solve_path(world, path, gripper_to_object, near_rad)
+            if not isinstance(joints, CubicSpline) or self._path_rejection(world, joints, longest_s):
                 continue
             carry = self._carry(world, path, gripper_to_object, np.asarray(joints_rad, float), joints(0.0), rng)
             if isinstance(carry, Motion):
                 return carry, path, joints
         return None
 
-    def onward(
+    def plan_spline(
         self,
         problem: PickPlaceProblem,
         path: HeldPath,
@@ -196,14 +204,14 @@ class HeldPathPlanner:
         as_hulls: bool,
     ) -> CubicSpline | None:
         """Plan from the current joints through all poses of a path for the measured pose in the hand; None if infeasible."""
-        world = self.parts.world_of(problem, problem.target.object_to_world, as_hulls=as_hulls)
+        world = self.parts.problem_world(problem, problem.target.object_to_world, as_hulls=as_hulls)
         world.hold(gripper_to_object)
         hands = path.poses @ gripper_to_object
         here = np.asarray(joints_rad, float)
-        knots = self._knots.onward(world, path, hands, [here], largest_rad=FROM_WHERE_IT_IS_RAD)
+        knots = self._knots.continue_knots(world, path, hands, [here], largest_rad=FROM_WHERE_IT_IS_RAD)
         return joint_spline(knots) if isinstance(knots, np.ndarray) else None
 
-    def timed(self, joints: CubicSpline, duration_s: float, phase: Phase, *, beyond: float = 1.0) -> Motion:
+    def time_path(self, joints: CubicSpline, duration_s: float, phase: Phase, *, beyond: float = 1.0) -> Motion:
         """Time a path over ``duration_s``, or longer if the joint limits require it (``path_timing.time_quintic``)."""
         parts = self.parts
         positions, velocities = time_quintic(joints, parts.motions.limits, duration_s, parts.timestep_s, beyond)
@@ -225,59 +233,59 @@ class HeldPathPlanner:
         """
         parts = self.parts
         world.hold(gripper_to_object)
-        joints = self._knots.joints_of(world, path, gripper_to_object, parts.arm.home)
+        joints = self._knots.solve_joints(world, path, gripper_to_object, parts.arm.home)
         if not isinstance(joints, CubicSpline):
             return joints
         if spare_m:
-            joints = self._knots.follow(world, path, gripper_to_object, parts.arm.home, spare_m)
+            joints = self._knots.solve_path(world, path, gripper_to_object, parts.arm.home, spare_m)
             if not isinstance(joints, CubicSpline):
                 return None
-        drawback = self._drawback(world, joints, longest_s)
+        drawback = self._path_rejection(world, joints, longest_s)
         if drawback is not None:
             return drawback
         grasp = replace(world.problem.grasps[index], gripper_to_object=gripper_to_object)
         if self._accepts is not None and not self._accepts(grasp, path, joints(1.0)):
             return "taker_blocked"
         grasped = world.problem.target.object_to_world @ gripper_to_object
-        solutions, converged = parts.solutions.of(world.arm, Phase.APPROACH, grasped, joints(0.0))
+        solutions, converged = parts.solutions.solve(world.arm, Phase.APPROACH, grasped, joints(0.0))
         failure: PlanFailure = "approach_blocked" if converged else "no_inverse_kinematics"
         for at_grasp in solutions:
             there = parts.arm.gripper_pose(at_grasp)
-            approach = parts.motions.line(world.arm, Phase.APPROACH, at_grasp, parts.ends.before(there))
+            approach = parts.motions.plan_line(world.arm, Phase.APPROACH, at_grasp, parts.ends.approach_start(there))
             if approach is None:
                 continue
-            lift = parts.motions.line(world.arm, Phase.LIFT, at_grasp, parts.ends.above(there))
+            lift = parts.motions.plan_line(world.arm, Phase.LIFT, at_grasp, parts.ends.lift_end(there))
             if lift is None:
-                failure = later(failure, "lift_blocked")
+                failure = later_failure(failure, "lift_blocked")
                 continue
-            lifted = parts.motions.timed(Phase.LIFT, lift)
+            lifted = parts.motions.time_path(Phase.LIFT, lift)
             lifted_rad, only = lifted.positions_rad[-1], spare_m > 0
             carry = self._carry(world, path, gripper_to_object, lifted_rad, joints(0.0), rng, level_only=only)
             if carry is None:
                 return None
             if not isinstance(carry, Motion):
-                failure = later(failure, carry)
+                failure = later_failure(failure, carry)
                 continue
-            approached = parts.motions.timed(Phase.APPROACH, approach, backwards=True)
-            reach = parts.motions.free(world.arm, Phase.REACH, parts.arm.home, approached.positions_rad[0], rng)
+            approached = parts.motions.time_path(Phase.APPROACH, approach, backwards=True)
+            reach = parts.motions.plan_free(world.arm, Phase.REACH, parts.arm.home, approached.positions_rad[0], rng)
             if isinstance(reach, Motion):
                 grasp = world.problem.grasps[index]
                 return HeldPlan(grasp, gripper_to_object, reach, approached, lifted, carry, path, joints)
-            failure = later(failure, reach)
+            failure = later_failure(failure, reach)
         return failure
 
     def _look_at_lift(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
         """Return why the arm cannot grasp and lift with a pose of a grasp, or None; cheap compared with ``accepts``."""
         parts, grasped = self.parts, world.problem.target.object_to_world @ gripper_to_object
-        solutions, converged = parts.solutions.of(world.arm, Phase.APPROACH, grasped, parts.arm.home)
+        solutions, converged = parts.solutions.solve(world.arm, Phase.APPROACH, grasped, parts.arm.home)
         failure: PlanFailure = "approach_blocked" if converged else "no_inverse_kinematics"
         for at_grasp in solutions:
             there = parts.arm.gripper_pose(at_grasp)
-            if parts.motions.line(world.arm, Phase.APPROACH, at_grasp, parts.ends.before(there)) is None:
+            if parts.motions.plan_line(world.arm, Phase.APPROACH, at_grasp, parts.ends.approach_start(there)) is None:
                 continue
-            if parts.motions.line(world.arm, Phase.LIFT, at_grasp, parts.ends.above(there)) is not None:
+            if parts.motions.plan_line(world.arm, Phase.LIFT, at_grasp, parts.ends.lift_end(there)) is not None:
                 return None
-            failure = later(failure, "lift_blocked")
+            failure = later_failure(failure, "lift_blocked")
         return failure
 
     def _carry(
@@ -295,7 +303,7 @@ class HeldPathPlanner:
 
         None: it must be ``level_only``, and only a tilted motion exists.
         """
-        target, arm, free = world.problem.target, self.parts.arm, self.parts.motions.free
+        target, arm, free = world.problem.target, self.parts.arm, self.parts.motions.plan_free
         upright = target.object_to_world[:3, :3]
         level = upright @ gripper_to_object[:3, :3]
         if self._level_rad is not None:
@@ -307,7 +315,7 @@ class HeldPathPlanner:
                 return found if isinstance(found, Motion) else None
         return free(world.arm, Phase.CARRY, start, end, rng)
 
-    def _drawback(self, world: ProblemWorld, joints: CubicSpline, longest_s: float) -> PlanFailure | None:
+    def _path_rejection(self, world: ProblemWorld, joints: CubicSpline, longest_s: float) -> PlanFailure | None:
         """Return why a feasible path is rejected: too slow, or no room for the hand to retreat at its end; otherwise None."""
         if self._shortest_s(joints) > longest_s:
             return "path_slow"
@@ -315,7 +323,7 @@ class HeldPathPlanner:
             return None
         motions, end = self.parts.motions, joints(1.0)
         back = self.parts.arm.gripper_pose(end) @ transform(translation=np.array([0.0, 0, -WITHDRAWN_M]))
-        return "retreat_blocked" if motions.line(world.arm, Phase.RETREAT, end, back) is None else None
+        return "retreat_blocked" if motions.plan_line(world.arm, Phase.RETREAT, end, back) is None else None
 
     def _shortest_s(self, joints: CubicSpline) -> float:
-        return len(self.timed(joints, 1.0, Phase.ACT).positions_rad) * self.parts.timestep_s
+        return len(self.time_path(joints, 1.0, Phase.ACT).positions_rad) * self.parts.timestep_s

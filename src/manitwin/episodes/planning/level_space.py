@@ -17,7 +17,7 @@ OPENS_UPWARD, UPRIGHT_RAD = np.cos(np.radians(12)), np.radians(12)
 TALL = 1.2  # ratio of height to width from which an object counts as standing
 
 
-def kept_level(placed: PlacedObject, opening: Opening | None) -> bool:
+def must_stay_level(placed: PlacedObject, opening: Opening | None) -> bool:
     """Tell whether an object should be carried level: its opening points upwards, or it is tall.
 
     The content of a standing mug, bowl or bottle is unknown, so it may be full.

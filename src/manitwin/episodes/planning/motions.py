@@ -29,7 +29,7 @@ class Motions:
         self._acceleration_limits = np.asarray(robot.acceleration_limits_rad_s2, float)
         self.limits = self._velocity_limits, self._acceleration_limits
 
-    def line(
+    def plan_line(
         self, world: CollisionWorld, phase: Phase, start: np.ndarray, end_to_world: np.ndarray
     ) -> CubicSpline | None:
         """Return the joint path of a straight line of the gripper that is free in a phase, or None."""
@@ -43,7 +43,7 @@ class Motions:
         steps = max(way_m / self._settings.check_step_m, turned_rad / self._settings.check_step_rad, 1.0)
         return path if is_path_free(world, path, int(np.ceil(steps))) else None
 
-    def timed(self, phase: Phase, path: JointPath, *, backwards: bool = False) -> Motion:
+    def time_path(self, phase: Phase, path: JointPath, *, backwards: bool = False) -> Motion:
         """Time a path from rest to rest; reversed in time if it was planned ``backwards``."""
         positions, velocities = time_rest_to_rest(
             path, self._velocity_limits, self._acceleration_limits, self._timestep_s
@@ -52,7 +52,7 @@ class Motions:
             positions, velocities = positions[::-1].copy(), -velocities[::-1]
         return Motion(phase, positions, velocities)
 
-    def free(
+    def plan_free(
         self, world: FreeSpace, phase: Phase, start: np.ndarray, goal: np.ndarray, rng: np.random.Generator
     ) -> Motion | PlanFailure:
         """Return a collision-free motion with the largest margin that start and goal allow, or the failure."""
@@ -61,7 +61,7 @@ class Motions:
             return "no_path"
         world.enter(phase, margin_m)
         if is_segment_free(start, goal, world.is_free, self._settings.check_step_rad):
-            return self.timed(phase, JointSegment(start, goal))
+            return self.time_path(phase, JointSegment(start, goal))
         waypoints = rrt_connect(
             start,
             goal,
@@ -105,7 +105,7 @@ class Motions:
         for start, end in pairwise(waypoints):
             if not is_segment_free(start, end, world.is_free, step_rad):
                 return None
-            pieces.append(self.timed(phase, JointSegment(start, end)))
+            pieces.append(self.time_path(phase, JointSegment(start, end)))
         positions = [pieces[0].positions_rad[:1], *(piece.positions_rad[1:] for piece in pieces)]
         velocities = [pieces[0].velocities_rad_s[:1], *(piece.velocities_rad_s[1:] for piece in pieces)]
         return Motion(phase, np.concatenate(positions), np.concatenate(velocities))

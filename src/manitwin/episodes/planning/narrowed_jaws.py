@@ -15,7 +15,7 @@ SPARE_M = 0.016  # additional opening over the object's width, both sides togeth
 STEP_M = 0.02  # openings are multiples of this, because each needs its own arm model
 
 
-def narrowed(grasps: Sequence[Grasp], gripper: Gripper) -> list[tuple[Grasp, ...]]:
+def group_by_opening(grasps: Sequence[Grasp], gripper: Gripper) -> list[tuple[Grasp, ...]]:
     """Group grasps by the opening that they need, narrowest first, in their order; empty unless the gripper has jaws.
 
     Grasps that need more than the full opening less one step are omitted.

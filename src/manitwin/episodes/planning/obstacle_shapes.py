@@ -10,7 +10,7 @@ import numpy as np
 from manitwin.episodes.planning.convex_shapes import ConvexBody, ShapeStore
 from manitwin.episodes.planning.libraries import coal, pin
 from manitwin.episodes.planning.problem import PickPlaceProblem
-from manitwin.geometry.rigid_body import stands_for_a_plane
+from manitwin.geometry.rigid_body import is_plane_equivalent
 
 # shapes within this distance, or overlapping by at most this, support the target: their contact is intended
 BEARING_GAP_M = 0.003
@@ -63,7 +63,7 @@ def obstacle_shapes(
     placed: list[tuple[str, Any, Any]] = []
     for box in (*problem.static_boxes, *problem.fixtures):
         half_m = np.asarray(box.half_extents_m, float)
-        if stands_for_a_plane(box):
+        if is_plane_equivalent(box):
             half_m = np.array([*np.maximum(half_m[:2], PLANE_M), half_m[2]])
         shape = coal.Box(2 * half_m)
         shape.computeLocalAABB()

@@ -10,11 +10,11 @@ import numpy as np
 from manitwin.episodes.planning.arm_planning import ArmPlanning
 from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.grasp_tally import GraspTally
-from manitwin.episodes.planning.narrowed_jaws import narrowed
+from manitwin.episodes.planning.narrowed_jaws import group_by_opening
 from manitwin.episodes.planning.placement import Placement, PlacementPlanner, goals_after_slip, goes_level
 from manitwin.episodes.planning.problem import (
     Grasp,
-    Grasped,
+    GraspingPlan,
     Motion,
     Phase,
     PickPlacePlan,
@@ -22,7 +22,7 @@ from manitwin.episodes.planning.problem import (
     PlanFailure,
     PlannerSettings,
     PlanReport,
-    later,
+    later_failure,
 )
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.robot import Robot
@@ -50,11 +50,11 @@ class PickPlacePlanner:
         self._narrowed = dict[float, PickPlacePlanner]()
         self.robot, self.settings, self.arm = robot, parts.settings, parts.arm
         self._ends, self._candidates, self._solutions = parts.ends, parts.candidates, parts.solutions
-        self._motions, self._world_of = parts.motions, parts.world_of
+        self._motions, self._world_of = parts.motions, parts.problem_world
         self._placements = PlacementPlanner(self.arm, self._solutions, self._motions, self._ends)
 
     @cached_property
-    def closed(self) -> ArmPlanning:
+    def closed_hand(self) -> ArmPlanning:
         """Planning models of the same arm with a closed hand, for pressing and pushing."""
         return ArmPlanning(self.robot, self.parts.timestep_s, self.settings, opening_m=0.0, standing=self._standing)
 
@@ -62,7 +62,7 @@ class PickPlacePlanner:
         """Return the grasp frame in the world ``(4, 4)`` (+Z approach, X closing)."""
         return self.arm.gripper_pose(np.asarray(joint_positions_rad, float))
 
-    def of(self, grasp: Grasp | None) -> PickPlacePlanner:
+    def with_opening_of(self, grasp: Grasp | None) -> PickPlacePlanner:
         """Return the planner whose jaws have the opening of a grasp."""
         opening_m = None if grasp is None else grasp.opening_m
         if opening_m == self._opening_m or opening_m is None:
@@ -82,8 +82,8 @@ class PickPlacePlanner:
         """
         report = self._plan_as_open(problem)
         if report.plan is None and report.failures.keys() & HAND_IN_THE_WAY:
-            for grasps in narrowed(problem.grasps, self.robot.gripper):
-                found = self.of(grasps[0])._plan_as_open(replace(problem, grasps=grasps))
+            for grasps in group_by_opening(problem.grasps, self.robot.gripper):
+                found = self.with_opening_of(grasps[0])._plan_as_open(replace(problem, grasps=grasps))
                 if found.plan is not None:
                     return replace(report, plan=found.plan)
         return report
@@ -98,7 +98,7 @@ class PickPlacePlanner:
     def _plan_grasps(self, problem: PickPlaceProblem, *, level_only: bool) -> PlanReport:
         world, rng = self._world_of(problem, problem.goal_object_to_world), np.random.default_rng(problem.seed)
         tally = GraspTally()
-        for candidate in self._candidates.of(world):
+        for candidate in self._candidates.check_grasps(world):
             grasp, failure = problem.grasps[candidate.index], candidate.failure
             if failure is None:
                 if tally.is_new(candidate.index) and len(tally.beyond_a_look) == self.settings.max_grasps:
@@ -106,16 +106,16 @@ class PickPlacePlanner:
                 tally.beyond_a_look.add(candidate.index)
                 outcome = self._plan_grasp(world, grasp, candidate.gripper_to_object, rng, level_only)
                 if isinstance(outcome, PickPlacePlan):
-                    tally.succeed(candidate.index)
+                    tally.record_success(candidate.index)
                     return PlanReport(outcome, tally.count_tried, tally.reasons)
                 failure = outcome
-            tally.count(candidate.index, failure)
+            tally.record_failure(candidate.index, failure)
         return PlanReport(None, tally.count_tried, tally.reasons)
 
     def plan_place(
         self,
         problem: PickPlaceProblem,
-        plan: Grasped,
+        plan: GraspingPlan,
         joint_positions_rad: np.ndarray,
         gripper_to_object: np.ndarray,
         goal_object_to_world: np.ndarray,
@@ -128,7 +128,7 @@ class PickPlacePlanner:
         rotation since ``plan`` grasped it, the object is released slightly higher or tilted. Returns None if there is no
         plan.
         """
-        fitting = self.of(plan.grasp)
+        fitting = self.with_opening_of(plan.grasp)
         if fitting is not self:
             return fitting.plan_place(
                 problem, plan, joint_positions_rad, gripper_to_object, goal_object_to_world, with_carry
@@ -149,17 +149,17 @@ class PickPlacePlanner:
                 return outcome
         return None
 
-    def plan_way_home(self, problem: PickPlaceProblem, joints_rad: np.ndarray) -> Motion | None:
+    def plan_return_home(self, problem: PickPlaceProblem, joints_rad: np.ndarray) -> Motion | None:
         """Plan the motion of the empty open hand to the home configuration; None if there is none."""
         world, rng = self._world_of(problem, problem.goal_object_to_world), np.random.default_rng((problem.seed, 5))
-        found = self._motions.free(world.arm, Phase.REACH, joints_rad, self.arm.home, rng)
+        found = self._motions.plan_free(world.arm, Phase.REACH, joints_rad, self.arm.home, rng)
         return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None
 
-    def reachable(self, problem: PickPlaceProblem) -> float:
+    def reachable_share(self, problem: PickPlaceProblem) -> float:
         """Return the share of grasps with a collision-free inverse kinematics and a straight approach, in any turn."""
-        return sum(self.reached(problem)) / max(1, len(problem.grasps))
+        return sum(self.reachable_grasps(problem)) / max(1, len(problem.grasps))
 
-    def reached(self, problem: PickPlaceProblem) -> list[bool]:
+    def reachable_grasps(self, problem: PickPlaceProblem) -> list[bool]:
         """Tell for each grasp whether it has a collision-free inverse kinematics and a straight approach, in any turn."""
         world = self._world_of(problem, problem.goal_object_to_world)
         return [self._can_be_reached(world, grasp) for grasp in problem.grasps]
@@ -169,12 +169,12 @@ class PickPlacePlanner:
         return any(self._can_approach(world, grasp.gripper_to_object @ turn) for turn in self._candidates.turns)
 
     def _can_approach(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> bool:
-        if self._candidates.look_at_approach(world, gripper_to_object) is not None:
+        if self._candidates.approach_failure(world, gripper_to_object) is not None:
             return False
         gripper_to_world = world.problem.target.object_to_world @ gripper_to_object
-        before = self._ends.before(gripper_to_world)
-        solutions, _ = self._solutions.of(world.arm, Phase.APPROACH, gripper_to_world, self.arm.home)
-        return any(self._motions.line(world.arm, Phase.APPROACH, found, before) is not None for found in solutions)
+        before = self._ends.approach_start(gripper_to_world)
+        solutions, _ = self._solutions.solve(world.arm, Phase.APPROACH, gripper_to_world, self.arm.home)
+        return any(self._motions.plan_line(world.arm, Phase.APPROACH, found, before) is not None for found in solutions)
 
     def _plan_grasp(
         self,
@@ -186,13 +186,13 @@ class PickPlacePlanner:
     ) -> PickPlacePlan | PlanFailure:
         """Return the plan of one pose of a grasp, or the latest stage that failed."""
         gripper_to_world = world.problem.target.object_to_world @ gripper_to_object
-        solutions, converged = self._solutions.of(world.arm, Phase.APPROACH, gripper_to_world, self.arm.home)
+        solutions, converged = self._solutions.solve(world.arm, Phase.APPROACH, gripper_to_world, self.arm.home)
         failure: PlanFailure = "approach_blocked" if converged else "no_inverse_kinematics"
         for at_grasp in solutions:
             outcome = self._plan_from(world, grasp, gripper_to_object, at_grasp, rng, level_only)
             if isinstance(outcome, PickPlacePlan):
                 return outcome
-            failure = later(failure, outcome)
+            failure = later_failure(failure, outcome)
         return failure
 
     def _plan_from(
@@ -206,21 +206,23 @@ class PickPlacePlanner:
     ) -> PickPlacePlan | PlanFailure:
         """Plan with the arm at one inverse kinematics solution of the grasp."""
         gripper_to_world = self.arm.gripper_pose(at_grasp)
-        approach = self._motions.line(world.arm, Phase.APPROACH, at_grasp, self._ends.before(gripper_to_world))
+        approach = self._motions.plan_line(
+            world.arm, Phase.APPROACH, at_grasp, self._ends.approach_start(gripper_to_world)
+        )
         if approach is None:
             return "approach_blocked"
-        lift = self._motions.line(world.arm, Phase.LIFT, at_grasp, self._ends.above(gripper_to_world))
+        lift = self._motions.plan_line(world.arm, Phase.LIFT, at_grasp, self._ends.lift_end(gripper_to_world))
         if lift is None:
             return "lift_blocked"
-        lifted = self._motions.timed(Phase.LIFT, lift)
+        lifted = self._motions.time_path(Phase.LIFT, lift)
         placed = world.goal_object_to_world @ gripper_to_object
         placement = self._placements.plan(world, lifted.positions_rad[-1], placed, rng, level_only=level_only)
         if not isinstance(placement, tuple):
             return placement
         carry, lower, retreat = placement
         assert carry is not None, "a placement from above the start has a carry"
-        approached = self._motions.timed(Phase.APPROACH, approach, backwards=True)
-        reach = self._motions.free(world.arm, Phase.REACH, self.arm.home, approached.positions_rad[0], rng)
+        approached = self._motions.time_path(Phase.APPROACH, approach, backwards=True)
+        reach = self._motions.plan_free(world.arm, Phase.REACH, self.arm.home, approached.positions_rad[0], rng)
         if not isinstance(reach, Motion):
             return reach
         return PickPlacePlan(grasp, gripper_to_object, reach, approached, lifted, carry, lower, retreat)

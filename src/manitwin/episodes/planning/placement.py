@@ -12,7 +12,7 @@ from manitwin.episodes.planning.arm_solutions import ArmSolutions
 from manitwin.episodes.planning.collision_world import FreeSpace, ProblemWorld
 from manitwin.episodes.planning.level_space import LEVEL_RAD, UPRIGHT_RAD, LevelSpace, tilts_rad
 from manitwin.episodes.planning.motions import Motions
-from manitwin.episodes.planning.problem import Motion, Phase, PickPlaceProblem, PlanFailure, later
+from manitwin.episodes.planning.problem import Motion, Phase, PickPlaceProblem, PlanFailure, later_failure
 from manitwin.episodes.planning.straight_lines import LineEnds
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import RigidBody
@@ -46,14 +46,14 @@ class PlacementPlanner:
 
         A target to be kept level is carried level if possible, with ``level_only`` in any case.
         """
-        solutions, converged = self._solutions.of(world.arm, Phase.LOWER, gripper_to_world, start)
+        solutions, converged = self._solutions.solve(world.arm, Phase.LOWER, gripper_to_world, start)
         failure: PlanFailure = "lower_blocked" if converged else "place_unreachable"
         for space in self._spaces(world, start, gripper_to_world, level_only=level_only):
             for at_goal in solutions:
                 outcome = self._plan_to(world, space, start, at_goal, rng)
                 if isinstance(outcome, tuple):
                     return outcome
-                failure = later(failure, outcome)
+                failure = later_failure(failure, outcome)
         return failure
 
     def _spaces(
@@ -75,10 +75,10 @@ class PlacementPlanner:
         self, world: ProblemWorld, start: np.ndarray, gripper_to_world: np.ndarray
     ) -> Placement | PlanFailure:
         """Plan lowering on a straight line from the current joints, and the retreat."""
-        lower = self._motions.line(world.arm, Phase.LOWER, start, gripper_to_world)
+        lower = self._motions.plan_line(world.arm, Phase.LOWER, start, gripper_to_world)
         if lower is None:
             return "lower_blocked"
-        lowered = self._motions.timed(Phase.LOWER, lower)
+        lowered = self._motions.time_path(Phase.LOWER, lower)
         retreat = self._retreat(world, lowered.positions_rad[-1])
         return (None, lowered, retreat) if isinstance(retreat, Motion) else retreat
 
@@ -90,21 +90,21 @@ class PlacementPlanner:
         at_goal: np.ndarray,
         rng: np.random.Generator,
     ) -> Placement | PlanFailure:
-        above = self._ends.above(self._arm.gripper_pose(at_goal))
-        lower = self._motions.line(world.arm, Phase.LOWER, at_goal, above)
+        above = self._ends.lift_end(self._arm.gripper_pose(at_goal))
+        lower = self._motions.plan_line(world.arm, Phase.LOWER, at_goal, above)
         if lower is None:
             return "lower_blocked"
         retreat = self._retreat(world, at_goal)
         if not isinstance(retreat, Motion):
             return retreat
-        lowered = self._motions.timed(Phase.LOWER, lower, backwards=True)
-        carry = self._motions.free(space, Phase.CARRY, start, lowered.positions_rad[0], rng)
+        lowered = self._motions.time_path(Phase.LOWER, lower, backwards=True)
+        carry = self._motions.plan_free(space, Phase.CARRY, start, lowered.positions_rad[0], rng)
         return (carry, lowered, retreat) if isinstance(carry, Motion) else carry
 
     def _retreat(self, world: ProblemWorld, at_goal: np.ndarray) -> Motion | PlanFailure:
-        before = self._ends.before(self._arm.gripper_pose(at_goal))
-        retreat = self._motions.line(world.arm, Phase.RETREAT, at_goal, before)
-        return "retreat_blocked" if retreat is None else self._motions.timed(Phase.RETREAT, retreat)
+        before = self._ends.approach_start(self._arm.gripper_pose(at_goal))
+        retreat = self._motions.plan_line(world.arm, Phase.RETREAT, at_goal, before)
+        return "retreat_blocked" if retreat is None else self._motions.time_path(Phase.RETREAT, retreat)
 
 
 def goes_level(problem: PickPlaceProblem, goal_object_to_world: np.ndarray) -> bool:

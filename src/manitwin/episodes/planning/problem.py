@@ -59,7 +59,7 @@ class PickPlaceProblem:
 
     ``static_boxes`` are the furniture, ``fixtures`` the boxes that a skill interacts with; both are static. ``entered`` are
     the names of obstacles that the held object enters, ``level`` those of objects to be carried level if possible
-    (``kept_level``).
+    (``must_stay_level``).
     """
 
     target: PlacedObject
@@ -82,7 +82,7 @@ class Motion:
     velocities_rad_s: np.ndarray
 
 
-class Grasped(Protocol):
+class GraspingPlan(Protocol):
     """Interface of a plan that states how it holds the target."""
 
     @property
@@ -122,7 +122,7 @@ class PlanReport:
     failures: Counter[PlanFailure] = field(default_factory=Counter)
 
 
-def later(first: PlanFailure, second: PlanFailure) -> PlanFailure:
+def later_failure(first: PlanFailure, second: PlanFailure) -> PlanFailure:
     """Return the failure that occurs later in planning, which is the more informative of two."""
     return max(first, second, key=get_args(PlanFailure).index)
 

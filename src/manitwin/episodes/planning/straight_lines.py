@@ -70,11 +70,11 @@ class LineEnds:
         self._back = transform(translation=np.array([0, 0, -settings.approach_m]))
         self._lift_m = settings.lift_m
 
-    def before(self, gripper_to_world: np.ndarray) -> np.ndarray:
+    def approach_start(self, gripper_to_world: np.ndarray) -> np.ndarray:
         """Return the start of the approach to a pose, which is also the end of the retreat from it."""
         return gripper_to_world @ self._back
 
-    def above(self, gripper_to_world: np.ndarray) -> np.ndarray:
+    def lift_end(self, gripper_to_world: np.ndarray) -> np.ndarray:
         """Return the end of the lift from a pose, which is also the start of lowering to it."""
         result = gripper_to_world.copy()
         result[..., 2, 3] += self._lift_m

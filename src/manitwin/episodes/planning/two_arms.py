@@ -14,9 +14,11 @@ from functools import cached_property
 import numpy as np
 
 from manitwin.episodes.planning.arm_obstacles import ArmObstacles
+from manitwin.episodes.planning.grasp_pairs import TwoHands
 from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.held_path import HeldPathPlanner, HeldPlan
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.placement_choice import PlacementChoice
 from manitwin.episodes.planning.problem import (
     Grasp,
     Motion,
@@ -25,8 +27,6 @@ from manitwin.episodes.planning.problem import (
     PlannerSettings,
     PlanReport,
 )
-from manitwin.episodes.planning.put_down import PutDown
-from manitwin.episodes.planning.two_hands import TwoHands
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.robots.robot import Robot
 
@@ -36,7 +36,7 @@ SETTLED_M = 0.004  # allowance for fingers that stand farther apart than planned
 
 
 @dataclass(frozen=True)
-class Take:
+class TakePlan:
     """The second arm's part: a grasp with its pose as used, and the motions from home to it."""
 
     grasp: Grasp
@@ -55,7 +55,7 @@ class HandoverPlan:
     """The first arm's motions until it waits with the object, and the second arm's motions to take it."""
 
     give: HeldPlan
-    take: Take
+    take: TakePlan
 
 
 class TwoArmPlanner(PickPlacePlanner):
@@ -70,22 +70,22 @@ class TwoArmPlanner(PickPlacePlanner):
         self._hands = TwoHands(self.parts, self.taker.parts, self._giver_shapes)
 
     @cached_property
-    def alone(self) -> PickPlacePlanner:
+    def giver_planner(self) -> PickPlacePlanner:
         """Planner for tasks of the first arm alone, with the second at home and its hand open."""
         resting = self._taker_shapes.at(self.taker.arm.home, (self._open_m,))
         return PickPlacePlanner(self.robot, self.parts.timestep_s, self.settings, resting)
 
     def plan_handover(
-        self, problem: PickPlaceProblem, meetings: Sequence[HeldPath], put_down: PutDown, *, longest_s: float
+        self, problem: PickPlaceProblem, meetings: Sequence[HeldPath], put_down: PlacementChoice, *, longest_s: float
     ) -> tuple[HandoverPlan | None, PlanReport]:
         """Plan with the first grasp that leaves room for a second one, and the first meeting place that both arms reach.
 
         The second grasp must allow ``put_down``. The report contains no plan, only the number of grasps tried and their
         failures.
         """
-        grasps = self._hands.givers(problem)
+        grasps = self._hands.giver_grasps(problem)
         asked = replace(self.with_taker_at(problem, self.taker.arm.home, None), grasps=grasps)
-        found: list[Take] = []
+        found: list[TakePlan] = []
 
         def can_be_taken(grasp: Grasp, path: HeldPath, joints_rad: np.ndarray) -> bool:
             take = self.plan_take(problem, path.poses[-1], joints_rad, grasp.width_m, grasp.gripper_to_object, put_down)
@@ -95,8 +95,8 @@ class TwoArmPlanner(PickPlacePlanner):
             return True
 
         def can_be_taken_somewhere(grasp: Grasp) -> bool:
-            others = self._hands.beside(problem, grasp.gripper_to_object)
-            return any(put_down.goal_of(other) is not None for other in others)
+            others = self._hands.taker_grasps(problem, grasp.gripper_to_object)
+            return any(put_down.first_feasible_goal(other) is not None for other in others)
 
         held = HeldPathPlanner(self.parts, accepts=can_be_taken, serves=can_be_taken_somewhere)
         give, report = held.plan(asked, meetings, as_hulls=False, longest_s=longest_s)
@@ -109,9 +109,9 @@ class TwoArmPlanner(PickPlacePlanner):
         giver_rad: np.ndarray,
         opening_m: float,
         giver_to_object: np.ndarray,
-        put_down: PutDown,
+        put_down: PlacementChoice,
         first: Sequence[Grasp] = (),
-    ) -> Take | None:
+    ) -> TakePlan | None:
         """Plan how the second arm, at home, takes the object that the first holds at ``object_to_world (4, 4)``.
 
         ``opening_m`` is the first hand's opening, ``giver_to_object (4, 4)`` its pose. Grasps in ``first`` are tried before
@@ -120,27 +120,30 @@ class TwoArmPlanner(PickPlacePlanner):
         """
         parts, ends = self.taker.parts, self.taker.parts.ends
         asked = self._at_meeting(problem, object_to_world, giver_rad, opening_m)
-        world, rng = parts.world_of(asked, object_to_world), np.random.default_rng((problem.seed, 6))
+        world, rng = parts.problem_world(asked, object_to_world), np.random.default_rng((problem.seed, 6))
         tried, most = 0, MOST_RETAKEN if first else MOST_TAKEN
-        for other in (*self._hands.turned(first, giver_to_object), *self._hands.beside(problem, giver_to_object)):
-            if parts.candidates.look_at_approach(world, other.gripper_to_object) is not None:
+        for other in (
+            *self._hands.apart_grasps(first, giver_to_object),
+            *self._hands.taker_grasps(problem, giver_to_object),
+        ):
+            if parts.candidates.approach_failure(world, other.gripper_to_object) is not None:
                 continue
-            if put_down.goal_of(other) is None:
+            if put_down.first_feasible_goal(other) is None:
                 continue
             tried += 1
             there = object_to_world @ other.gripper_to_object
-            solutions, _ = parts.solutions.of(world.arm, Phase.APPROACH, there, parts.arm.home)
+            solutions, _ = parts.solutions.solve(world.arm, Phase.APPROACH, there, parts.arm.home)
             for at_grasp in solutions:
-                line = parts.motions.line(world.arm, Phase.APPROACH, at_grasp, ends.before(there))
+                line = parts.motions.plan_line(world.arm, Phase.APPROACH, at_grasp, ends.approach_start(there))
                 if line is None:
                     continue
-                approach = parts.motions.timed(Phase.APPROACH, line, backwards=True)
+                approach = parts.motions.time_path(Phase.APPROACH, line, backwards=True)
                 if self.plan_withdrawal(problem, object_to_world, giver_rad, at_grasp, other.grasp) is None:
                     continue
                 start = approach.positions_rad[0]
-                reach = parts.motions.free(world.arm, Phase.REACH, parts.arm.home, start, rng)
+                reach = parts.motions.plan_free(world.arm, Phase.REACH, parts.arm.home, start, rng)
                 if isinstance(reach, Motion):
-                    return Take(other.grasp, other.gripper_to_object, reach, approach)
+                    return TakePlan(other.grasp, other.gripper_to_object, reach, approach)
             if tried == most:
                 return None
         return None
@@ -168,20 +171,23 @@ class TwoArmPlanner(PickPlacePlanner):
         """Plan the first arm's motion home around the second arm, which holds the object; None if there is none."""
         asked = self.with_taker_at(problem, taker_rad, grasp)
         asked = replace(asked, target=replace(problem.target, object_to_world=object_to_world))
-        world, rng = self.parts.world_of(asked, object_to_world), np.random.default_rng((problem.seed, 7))
-        found = self.parts.motions.free(world.arm, Phase.REACH, giver_rad, self.arm.home, rng)
+        world, rng = self.parts.problem_world(asked, object_to_world), np.random.default_rng((problem.seed, 7))
+        found = self.parts.motions.plan_free(world.arm, Phase.REACH, giver_rad, self.arm.home, rng)
         return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None
 
     def plan_taker_home(self, problem: PickPlaceProblem, taker_rad: np.ndarray, giver_rad: np.ndarray) -> Motion | None:
         """Plan the second arm's motion home with its hand empty and open; None if there is none."""
         asked, parts = self.with_giver_at(problem, giver_rad), self.taker.parts
-        world, rng = parts.world_of(asked, problem.target.object_to_world), np.random.default_rng((problem.seed, 10))
-        found = parts.motions.free(world.arm, Phase.REACH, taker_rad, parts.arm.home, rng)
+        world, rng = (
+            parts.problem_world(asked, problem.target.object_to_world),
+            np.random.default_rng((problem.seed, 10)),
+        )
+        found = parts.motions.plan_free(world.arm, Phase.REACH, taker_rad, parts.arm.home, rng)
         return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None
 
-    def put_down(self, problem: PickPlaceProblem, goals: Sequence[np.ndarray]) -> PutDown:
+    def placement_choice(self, problem: PickPlaceProblem, goals: Sequence[np.ndarray]) -> PlacementChoice:
         """Return the placement choice of the second arm among ``goals (4, 4)``, with the first arm at home."""
-        return PutDown(self.taker, self.with_giver_at(problem, self.arm.home), goals)
+        return PlacementChoice(self.taker, self.with_giver_at(problem, self.arm.home), goals)
 
     def plan_bring_home(
         self, problem: PickPlaceProblem, gripper_to_object: np.ndarray, taker_rad: np.ndarray, giver_rad: np.ndarray
@@ -189,15 +195,18 @@ class TwoArmPlanner(PickPlacePlanner):
         """Plan the second arm's motion home with the held object, or else straight up; None if there is none."""
         parts = self.taker.parts
         asked = self.with_giver_at(problem, giver_rad)
-        world, rng = parts.world_of(asked, problem.target.object_to_world), np.random.default_rng((problem.seed, 8))
+        world, rng = (
+            parts.problem_world(asked, problem.target.object_to_world),
+            np.random.default_rng((problem.seed, 8)),
+        )
         world.hold(gripper_to_object)
-        home = parts.motions.free(world.arm, Phase.CARRY, taker_rad, parts.arm.home, rng)
+        home = parts.motions.plan_free(world.arm, Phase.CARRY, taker_rad, parts.arm.home, rng)
         if isinstance(home, Motion):
             return home
-        line = parts.motions.line(
-            world.arm, Phase.CARRY, taker_rad, parts.ends.above(parts.arm.gripper_pose(taker_rad))
+        line = parts.motions.plan_line(
+            world.arm, Phase.CARRY, taker_rad, parts.ends.lift_end(parts.arm.gripper_pose(taker_rad))
         )
-        return None if line is None else parts.motions.timed(Phase.CARRY, line)
+        return None if line is None else parts.motions.time_path(Phase.CARRY, line)
 
     def with_giver_at(self, problem: PickPlaceProblem, giver_rad: np.ndarray) -> PickPlaceProblem:
         """Return the second arm's problem with the first arm, hand open, as an obstacle."""
@@ -230,6 +239,6 @@ def planner_of(robot: Robot, timestep_s: float) -> PickPlacePlanner:
     return (TwoArmPlanner if robot.arms else PickPlacePlanner)(robot, timestep_s=timestep_s)
 
 
-def alone(planner: PickPlacePlanner) -> PickPlacePlanner:
+def single_arm_planner(planner: PickPlacePlanner) -> PickPlacePlanner:
     """Return the planner for tasks of a single arm: for two arms that of the first."""
-    return planner.alone if isinstance(planner, TwoArmPlanner) else planner
+    return planner.giver_planner if isinstance(planner, TwoArmPlanner) else planner

@@ -26,7 +26,7 @@ def plan_withdrawal(
     The distance is 10 cm, or less if that is blocked. If every distance is blocked, ``blind`` plans 5 cm without collision
     checks, because a hand that stays keeps holding the object. Returns None if no motion is found.
     """
-    world = parts.world_of(problem, object_to_world, as_hulls=True)
+    world = parts.problem_world(problem, object_to_world, as_hulls=True)
     start = np.asarray(joints_rad, float)
     here = parts.arm.gripper_pose(start)
 
@@ -34,10 +34,10 @@ def plan_withdrawal(
         return here @ transform(translation=np.array([0.0, 0, -way_m]))
 
     for way_m in WAYS_M:
-        line = parts.motions.line(world.arm, Phase.RETREAT, start, back(way_m))
+        line = parts.motions.plan_line(world.arm, Phase.RETREAT, start, back(way_m))
         if line is not None:
-            return parts.motions.timed(Phase.RETREAT, line)
+            return parts.motions.time_path(Phase.RETREAT, line)
     if not blind:
         return None
     line = straight_line(parts.arm, start, back(BLIND_M))
-    return None if line is None else parts.motions.timed(Phase.RETREAT, line)
+    return None if line is None else parts.motions.time_path(Phase.RETREAT, line)

@@ -8,7 +8,7 @@ from typing import Any
 
 from manitwin.dataset.publish.card import front_matter, licence_section
 from manitwin.dataset.publish.licences import LICENSES_MD
-from manitwin.episodes.attempts import ATTEMPTS, Success, Tally
+from manitwin.episodes.attempts import ATTEMPTS, AttemptCounts, StageCounts
 from manitwin.episodes.lerobot.lerobot_format import CODEC
 from manitwin.formats.markdown import markdown_escaped, table
 
@@ -33,7 +33,7 @@ class EpisodesCard:
     name: str
     info: Mapping[str, Any]
     twins: Sequence[Mapping[str, Any]]
-    success: Success
+    success: AttemptCounts
     left_out: Mapping[str, int]
     attempt_rows: int
     made_of: Mapping[str, str]
@@ -124,7 +124,7 @@ def _cameras(info: Mapping[str, Any]) -> str:
     )
 
 
-def _success(success: Success) -> list[str]:
+def _success(success: AttemptCounts) -> list[str]:
     head = ["category", "attempted", "executed", "succeeded", "of executed", "kept"]
     order = sorted(success.by_category, key=lambda name: (-success.by_category[name].attempted, name))
     rows = [_row(markdown_escaped(name) or "not told", success.by_category[name]) for name in order[:CATEGORIES_SHOWN]]
@@ -144,7 +144,7 @@ def _success(success: Success) -> list[str]:
     ]
 
 
-def _row(name: str, tally: Tally) -> list[str]:
+def _row(name: str, tally: StageCounts) -> list[str]:
     rate = f"{tally.succeeded / tally.executed:.1%}" if tally.executed else "-"
     return [name, f"{tally.attempted:,}", f"{tally.executed:,}", f"{tally.succeeded:,}", rate, f"{tally.kept:,}"]
 

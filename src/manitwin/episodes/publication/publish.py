@@ -14,23 +14,30 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from manitwin.dataset.publish.licences import LICENSES_MD, licenses_page, without_attribution
-from manitwin.dataset.publish.privacy import check_words, places_of
+from manitwin.dataset.publish.privacy import check_text, local_paths
 from manitwin.dataset.publish.publication import EPISODES, Publication
 from manitwin.engine.ledger.location import CONFIG
-from manitwin.episodes.attempts import ATTEMPTS, Success, merge_attempts, read_attempts, success_of, write_attempts
+from manitwin.episodes.attempts import (
+    ATTEMPTS,
+    AttemptCounts,
+    count_attempts,
+    merge_attempts,
+    read_attempts,
+    write_attempts,
+)
 from manitwin.episodes.collect import any_granules, batch_folders, stored_episodes
 from manitwin.episodes.configuration import read_configuration
+from manitwin.episodes.downsampling import RATES_HZ
 from manitwin.episodes.episode_pictures import PICTURES, batch_name, read_pictures
-from manitwin.episodes.film import Film
-from manitwin.episodes.film_encoders import Codec
 from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
 from manitwin.episodes.lerobot.write import write_lerobot
-from manitwin.episodes.lower_rates import RATES_HZ
 from manitwin.episodes.publication.card import OF_EPISODES, TWINS_FILE, EpisodesCard, episodes_card
-from manitwin.episodes.publication.choose import Chosen, choose_episodes
+from manitwin.episodes.publication.episode_selection import EpisodeSelection, choose_episodes
 from manitwin.episodes.recording import RATE_HZ
-from manitwin.episodes.video import EpisodesVideo
+from manitwin.episodes.video import VideoWriter
+from manitwin.episodes.video_encoders import Codec
+from manitwin.episodes.video_reading import VideoReader
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.formats.installation import installed_version
 from manitwin.formats.json_file import read_json_object
@@ -51,7 +58,7 @@ _DRAW = "run manitwin render again"
 _CAMERA = re.compile(r"[0-9A-Za-z_-]+")
 
 
-def drawn_from(episodes: Path) -> tuple[tuple[str, ...], int]:
+def rendered_cameras(episodes: Path) -> tuple[tuple[str, ...], int]:
     """Return the cameras of a run's rendered pictures, and their rate in Hz; no cameras if it was not rendered."""
     path = episodes / PICTURES / CONFIG
     if not os.path.lexists(path):
@@ -65,7 +72,7 @@ def drawn_from(episodes: Path) -> tuple[tuple[str, ...], int]:
     return tuple(cameras), int(rate_hz)
 
 
-def films_of(
+def camera_videos(
     episodes: Path, cameras: tuple[str, ...], batches: list[Path], allowed: Set[str], scratch: Path
 ) -> list[CameraVideos]:
     """Return the videos of ``cameras`` that contain only ``allowed`` episodes.
@@ -86,17 +93,19 @@ def films_of(
             if len(kept) == len(first_frames):
                 clips[camera] |= {name: Clip(film, first) for name, first in kept.items()}
             else:
-                clips[camera] |= cut_film(film, first_frames, allowed, scratch / f"{batch.name}-{camera}.mp4")
+                clips[camera] |= cut_video(film, first_frames, allowed, scratch / f"{batch.name}-{camera}.mp4")
     return [CameraVideos(camera, clips[camera], pinholes.get(camera, {})) for camera in cameras]
 
 
-def cut_film(film: Path, first_frames: dict[str, int], allowed: Set[str], place: Path) -> dict[str, Clip]:
+def cut_video(film: Path, first_frames: dict[str, int], allowed: Set[str], place: Path) -> dict[str, Clip]:
     """Write the ``allowed`` episodes of a video, whose episodes are contiguous, to another one; return their clips."""
-    with Film(film) as shown:
+    with VideoReader(film) as shown:
         return _cut(film, shown, first_frames, allowed, place)
 
 
-def _cut(film: Path, shown: Film, first_frames: dict[str, int], allowed: Set[str], place: Path) -> dict[str, Clip]:
+def _cut(
+    film: Path, shown: VideoReader, first_frames: dict[str, int], allowed: Set[str], place: Path
+) -> dict[str, Clip]:
     facts = shown.facts
     order = sorted(first_frames, key=first_frames.__getitem__)
     if order and not 0 <= first_frames[order[0]] <= first_frames[order[-1]] < facts.frames:
@@ -107,7 +116,7 @@ def _cut(film: Path, shown: Film, first_frames: dict[str, int], allowed: Set[str
     clips: dict[str, Clip] = {}
     pictures = iter(shown)
     codec, rate_hz = cast(Codec, facts.codec), round(facts.rate_hz)
-    with EpisodesVideo(place, width_px=facts.width_px, height_px=facts.height_px, codec=codec, rate_hz=rate_hz) as cut:
+    with VideoWriter(place, width_px=facts.width_px, height_px=facts.height_px, codec=codec, rate_hz=rate_hz) as cut:
         for name, end in zip(order, ends, strict=True):
             episode = list(islice(pictures, end - first_frames[name]))
             if len(episode) != end - first_frames[name]:
@@ -159,21 +168,21 @@ def publish_episodes(
         batches, read_attempts(episodes / ATTEMPTS), source, license_allow, with_rehearsals=with_rehearsals
     )
     publication = Publication(DatasetRoot(out), EPISODES)
-    publication.refuse_others()
+    publication.require_own_root()
     try:
         with publication.scratch() as scratch:
             made = scratch / "made"
-            cameras, rate_hz = drawn_from(episodes)
-            films = films_of(episodes, cameras, batches, chosen.episodes.published.keys(), scratch / "films")
+            cameras, rate_hz = rendered_cameras(episodes)
+            films = camera_videos(episodes, cameras, batches, chosen.episodes.published.keys(), scratch / "films")
             kept = (each for each in stored_episodes(batches) if each.attempt.episode_id in chosen.episodes.published)
             write_lerobot(kept, made, videos=films, granules=any_granules(batches), rate_hz=rate_hz)
             checked = read_lerobot(made)
             rows = _write_tables(episodes, chosen, made)
-            success = success_of(each for each in read_attempts(episodes / ATTEMPTS) if chosen.tells_of(each))
+            success = count_attempts(each for each in read_attempts(episodes / ATTEMPTS) if chosen.counts_attempt(each))
             pages = _pages(title, checked, chosen, success, rows, said)
-            places = places_of([DatasetRoot(episodes), source.root, publication.root])
+            places = local_paths([DatasetRoot(episodes), source.root, publication.root])
             for page, words in {**pages, "meta/tasks.parquet": "\n".join(checked.tasks)}.items():
-                check_words(page, words, places, EpisodesError)
+                check_text(page, words, places, EpisodesError)
             publication.begin()
             for path in sorted(path for path in made.rglob("*") if path.is_file()):
                 publication.put(path, path.relative_to(made).as_posix())
@@ -202,10 +211,10 @@ def _configuration(episodes: Path) -> dict[str, Any]:
     return read_configuration(episodes)
 
 
-def _write_tables(episodes: Path, chosen: Chosen, made: Path) -> int:
+def _write_tables(episodes: Path, chosen: EpisodeSelection, made: Path) -> int:
     """Write the published attempts, numbered like the episodes, and the twins; return the number of attempts."""
     unnumbered = made / f".{ATTEMPTS}"
-    write_attempts(unnumbered, (each for each in read_attempts(episodes / ATTEMPTS) if chosen.publishes(each)))
+    write_attempts(unnumbered, (each for each in read_attempts(episodes / ATTEMPTS) if chosen.includes_attempt(each)))
     rows, _ = merge_attempts([unnumbered], made / ATTEMPTS)
     unnumbered.unlink()
     twins = pa.Table.from_pylist(chosen.rows, schema=TWINS_SCHEMA)
@@ -214,7 +223,7 @@ def _write_tables(episodes: Path, chosen: Chosen, made: Path) -> int:
 
 
 def _pages(
-    title: str, checked: LeRobotSet, chosen: Chosen, success: Success, rows: int, said: dict[str, Any]
+    title: str, checked: LeRobotSet, chosen: EpisodeSelection, success: AttemptCounts, rows: int, said: dict[str, Any]
 ) -> dict[str, str]:
     made_of = {"objects": f"data set {Path(said['dataset']).name}"}
     if said["scenes"]:

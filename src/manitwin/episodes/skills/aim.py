@@ -12,7 +12,7 @@ from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.episodes.tool_watches import AimWatch
 from manitwin.geometry.frames.feature import rotation_of
-from manitwin.geometry.frames.words import aims, grip_rank
+from manitwin.geometry.frames.label_keywords import grip_rank, is_aiming_label
 from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
@@ -103,7 +103,7 @@ class Aim(HeldSkill):
 
 def nozzle_of(frames: tuple[TwinFrame, ...]) -> TwinFrame | None:
     """Return the first frame whose label means an outlet or a lens."""
-    return next((frame for frame in frames if frame.kind in KINDS and aims(frame.label)), None)
+    return next((frame for frame in frames if frame.kind in KINDS and is_aiming_label(frame.label)), None)
 
 
 def grip_of(frames: tuple[TwinFrame, ...]) -> TwinFrame | None:

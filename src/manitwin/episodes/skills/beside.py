@@ -48,14 +48,14 @@ class Beside(Skill):
         center = transform_points(object_to_plane, moved.body.center_of_mass_m[None])[0, :2]
         reach_m = _reach_m(beside, middle) + _reach_m(corners, center) + SIDE_GAP_M[1]
         for share in INSIDE_SHARES:
-            for area in (around.area, around.area.beyond()):
+            for area in (around.area, around.area.extended()):
                 for yaw in rng.uniform(-np.pi, np.pi, YAWS):
-                    turn = _about_z(yaw)
+                    turn = _rotation_about_z(yaw)
                     turned = corners @ turn[:2, :2].T
                     places = middle + self._offsets_m(rng, share, reach_m) - turn[:2, :2] @ center
                     near = separations_m(turned, beside, places) <= share * self._most_gap_m
                     free = np.all([separations_m(turned, each, places) >= MIN_GAP_M for each in taken], axis=0)
-                    at = next((at for at in places[near & free] if area.reaches(at, turned + at)), None)
+                    at = next((at for at in places[near & free] if area.is_reachable(at, turned + at)), None)
                     if at is not None:  # one pose per heading: if it cannot be planned, another heading is tried
                         yield transform(turn, np.array([*at, 0.0])) @ object_to_plane
 
@@ -80,6 +80,6 @@ def _reach_m(corners: np.ndarray, middle: np.ndarray) -> float:
     return float(np.linalg.norm(corners - middle, axis=1).max())
 
 
-def _about_z(angle_rad: float) -> np.ndarray:
+def _rotation_about_z(angle_rad: float) -> np.ndarray:
     cos, sin = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1.0]])

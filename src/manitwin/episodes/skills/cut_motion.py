@@ -14,7 +14,7 @@ from manitwin.episodes.skills.held_skill import HeldSkill, board_in_reach
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.episodes.skills.skill import Surroundings
 from manitwin.episodes.tool_watches import CutWatch
-from manitwin.geometry.frames.words import cuts
+from manitwin.geometry.frames.label_keywords import is_cutting_edge
 from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
@@ -43,7 +43,7 @@ class CutMotion(HeldSkill):
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
         """Accept a cutting object with an edge of at least 5 cm."""
         edge = edge_of(target.frames)
-        return edge is not None and cuts(target.category, edge.label)
+        return edge is not None and is_cutting_edge(target.category, edge.label)
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
         """Return the goal that the edge moved along the line."""

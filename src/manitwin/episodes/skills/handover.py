@@ -36,7 +36,7 @@ class Handover(Skill):
             if placement.probability >= LEAST_LIKELY and abs(here[2, :3] - turned[2, :3]).max() > SAME:
                 yield transform(turned[:3, :3], here[:3, 3])
 
-    def set_goal(
+    def sample_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
         """Return the goal: handed over, and put down in any of ``poses``."""

@@ -76,7 +76,7 @@ class Hang(HeldSkill):
             for sign in scene.rng.permutation([1.0, -1.0]):
                 hole_to_object = transform(rotation_of(sign * axis, up), hole)
                 turned = stand.frame_to_world @ transform(Rotation.from_euler("z", lean).as_matrix())
-                poses = _onto(turned, room_m) @ inverse(hole_to_object)
+                poses = _sliding_poses(turned, room_m) @ inverse(hole_to_object)
                 paths.append(HeldPath(poses, frozenset({PEG}), meant_from=SLIDING_KNOTS))
 
         def rank(grasp: Grasp) -> float | None:
@@ -104,7 +104,7 @@ def _hanging(
     return up, room_m
 
 
-def _onto(stand: np.ndarray, room_m: float) -> np.ndarray:
+def _sliding_poses(stand: np.ndarray, room_m: float) -> np.ndarray:
     """Return poses ``(K, 4, 4)`` of the hole's frame: along the peg from before its tip, then down until the hole rests on it."""
     along_m = np.linspace(PEG_LENGTH_M + BEFORE_TIP_M, HUNG_SHARE * PEG_LENGTH_M, SLIDING_KNOTS)
     steps = [stand @ transform(translation=np.array([0.0, 0, each])) for each in along_m]

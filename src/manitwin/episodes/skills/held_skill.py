@@ -40,7 +40,7 @@ class HeldSkill(Skill):
         """Yield the target's current pose, because the goal depends on the path."""
         yield around.objects[target].object_to_world
 
-    def set_goal(
+    def sample_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
         """Return the goal with its fixtures; None if there is no room for them."""
@@ -69,14 +69,14 @@ class HeldSkill(Skill):
             if drawn is None:
                 return ()
             clear = all(separation_m(drawn.footprint_m, each) >= MIN_GAP_M for each in taken)
-            if clear and around.area.wider().holds(drawn.footprint_m):
+            if clear and around.area.widened().contains_footprint(drawn.footprint_m):
                 return (drawn,)
         return None
 
 
 def board_in_reach(around: Surroundings, half_m: np.ndarray, name: str, rng: np.random.Generator) -> Fixture | None:
     """Draw a board with half extents ``(3,)`` m in reach on the furniture; None if none fits."""
-    place = around.area.draw(board(np.zeros(3), 0.0, half_m).footprint_m, [], rng)
+    place = around.area.sample_pose(board(np.zeros(3), 0.0, half_m).footprint_m, [], rng)
     if place is None:
         return None
     position_m = place[:3, 3] + [0.0, 0, around.area.support.height_m]

@@ -43,7 +43,7 @@ class HeldScene:
 
 
 @dataclass(frozen=True)
-class Guard:
+class GuardedMove:
     """Guarded move: from knot ``first`` on, until the watched force reaches ``stop_n``.
 
     Contact is expected at knot ``touches``. The speed is at most ``speed_m_s``, and the move creeps at the expected contact.
@@ -65,7 +65,7 @@ class Guard:
 
 
 @dataclass(frozen=True)
-class Regulated:
+class ForceControlledMove:
     """Force-controlled move: from knot ``first`` on, from where the guard stopped, with the watched force kept at ``force_n``.
 
     The path uses only the positions of the poses, relative to where the guard stopped. ``normal (3,)``, out of the surface in
@@ -103,8 +103,8 @@ class HeldTask:
     measured: int = MEASURED_TIMES
     hold_s: float = 0.0
     ending: Literal["let_go", "keep", "put_back"] = "let_go"
-    guard: Guard | None = None
-    regulated: Regulated | None = None
+    guard: GuardedMove | None = None
+    regulated: ForceControlledMove | None = None
     rises: bool = False
     comes_out: bool = False
     level_rad: float | None = None

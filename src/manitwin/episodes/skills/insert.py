@@ -56,7 +56,7 @@ class Insert(HeldSkill):
         assert stick is not None, "only things with a tip are inserted"
         depth_m = _depth_m(points, stick)
         bore_m = _section(points, stick, depth_m).bore_half_m
-        place = around.area.draw(holder(np.zeros(3), 0.0, bore_m, depth_m).footprint_m, [], rng)
+        place = around.area.sample_pose(holder(np.zeros(3), 0.0, bore_m, depth_m).footprint_m, [], rng)
         if place is None:
             return None
         position_m = place[:3, 3] + [0.0, 0, around.area.support.height_m]

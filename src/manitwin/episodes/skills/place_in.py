@@ -7,13 +7,19 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
-from manitwin.episodes.skills.dropping import all_rest, nearby, rest_after_drop
-from manitwin.episodes.skills.skill import Skill, Surroundings, tries
-from manitwin.episodes.skills.within_rim import FREE_FALL_M, as_it_is, leaning, on_end, radius_on_end
+from manitwin.episodes.skills.drop_test import all_drops_succeed, perturbed_poses, rest_after_drop
+from manitwin.episodes.skills.skill import Skill, Surroundings, successful_draws
+from manitwin.episodes.skills.within_rim import (
+    FREE_FALL_M,
+    leaning_pose,
+    pose_in_orientation,
+    pose_on_end,
+    radius_on_end,
+)
 from manitwin.geometry.hull_distance import PlacedParts
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
-from manitwin.scenes.layouts.stacking import Mouth, mouth_of, open_poses, put_into
+from manitwin.scenes.layouts.stacking import ContainerOpening, container_opening, open_poses, place_in_container
 
 LEAST_DEPTH_M = 0.025  # of a vessel: an object on a plate lies on it, and rolls off
 LEANING_FALL_M = 0.004  # release height above where a drop ended
@@ -56,7 +62,7 @@ class PlaceIn(Skill):
         rim; or at the rim of a deep vessel, at the poses before the drop.
         """
         assert partner is not None
-        mouth = mouth_of(around.body(partner), around.objects[partner].object_to_world)
+        mouth = container_opening(around.body(partner), around.objects[partner].object_to_world)
         if mouth is None:
             return
         vessel = around.parts(partner)
@@ -71,13 +77,15 @@ class PlaceIn(Skill):
 
         body, standing = around.body(target), around.objects[target].object_to_world[:3, :3]
         for _ in range(ROUNDS):
-            ends = tries(lambda: on_end(body, vessel, mouth, rng, deep=bool(rng.random() < 0.5)), ON_END_TRIED)
-            lying = tries(lambda: _lying(around, target, vessel, mouth, rng), LYING_TRIED)
-            as_now = tries(lambda: as_it_is(body, standing, vessel, mouth, rng), AS_IT_IS_TRIED)
+            ends = successful_draws(
+                lambda: pose_on_end(body, vessel, mouth, rng, deep=bool(rng.random() < 0.5)), ON_END_TRIED
+            )
+            lying = successful_draws(lambda: _lying(around, target, vessel, mouth, rng), LYING_TRIED)
+            as_now = successful_draws(lambda: pose_in_orientation(body, standing, vessel, mouth, rng), AS_IT_IS_TRIED)
             by_turns = zip_longest(steadiest(chain(as_now, lying)), steadiest(ends))
             pairs = [pair for both in by_turns for pair in both if pair is not None]
             yield from self._steady(around, target, partner, [rest for rest, _ in pairs[:RESTS_FIRST]], rng)
-            leans = tries(lambda: leaning(body, standing, vessel, mouth, rng), LEANING_TRIED)
+            leans = successful_draws(lambda: leaning_pose(body, standing, vessel, mouth, rng), LEANING_TRIED)
             for rest, begun in steadiest(leans):
                 yield from self._steady(around, target, partner, [begun, rest], rng)
             for rest, begun in pairs:
@@ -97,15 +105,15 @@ class PlaceIn(Skill):
         """Yield the poses from which the goal is also reached with perturbations."""
         goal = self.goal(around.objects[target], around.objects[partner])
         for pose in poses:
-            if all_rest(around, target, partner, goal, nearby(pose, rng, scale)):
+            if all_drops_succeed(around, target, partner, goal, perturbed_poses(pose, rng, scale)):
                 yield pose
 
 
 def _lying(
-    around: Surroundings, target: int, vessel: PlacedParts, mouth: Mouth, rng: np.random.Generator
+    around: Surroundings, target: int, vessel: PlacedParts, mouth: ContainerOpening, rng: np.random.Generator
 ) -> np.ndarray | None:
     twin = around.twin(target)
-    put = put_into(twin, around.body(target), around.area.support.name, mouth, [vessel], rng)
+    put = place_in_container(twin, around.body(target), around.area.support.name, mouth, [vessel], rng)
     if put is None:
         return None
     pose = put.object_to_world.copy()

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.skills.dropping import all_rest, nearby, rest_after_drop
+from manitwin.episodes.skills.drop_test import all_drops_succeed, perturbed_poses, rest_after_drop
 from manitwin.episodes.skills.skill import Skill, Surroundings
 from manitwin.geometry.hull_distance import PlacedParts
 from manitwin.geometry.poses import rotation_angle_rad, transform, transform_points
-from manitwin.scenes.layouts.placing import draw_pose, on_plane
+from manitwin.scenes.layouts.placing import pose_on_plane, sample_pose
 from manitwin.scenes.layouts.pool import Pool, PoolBody, PoolTwin
-from manitwin.scenes.layouts.stacking import Level, level_end, lower
+from manitwin.scenes.layouts.stacking import LevelFace, level_end, lower_to_contact
 
 AS_IT_IS_TRIED, DRAWN_TRIED = 2, 8
 ABOVE_M, RAISED_M = 0.001, 0.02
@@ -56,25 +56,27 @@ class PlaceOn(Skill):
         spread_m = SPREAD_SHARE * top.depth_inside(top.middle_m)
         for number in range(AS_IT_IS_TRIED + DRAWN_TRIED):
             if number < AS_IT_IS_TRIED:
-                pose = _as_it_is(body, around.objects[target].object_to_world, rng)
+                pose = _with_random_heading(body, around.objects[target].object_to_world, rng)
             else:
-                pose = on_plane(draw_pose(around.twin(target).poses, rng), np.zeros(2), 0.0, rng.uniform(-np.pi, np.pi))
+                pose = pose_on_plane(
+                    sample_pose(around.twin(target).poses, rng), np.zeros(2), 0.0, rng.uniform(-np.pi, np.pi)
+                )
             center = transform_points(pose, body.body.center_of_mass_m[None])[0, :2]
             shift = top.middle_m - center + (0.0 if number == 0 else rng.uniform(-spread_m, spread_m, 2))
             raised = transform(translation=np.array([*shift, high[2] + RAISED_M])) @ pose
-            start = self._let_go(around, target, partner, raised)
+            start = self._release_pose(around, target, partner, raised)
             rested = None if start is None else rest_after_drop(around, target, partner, goal, start)
-            if start is None or rested is None or not _stayed(body, start, rested):
+            if start is None or rested is None or not _is_unmoved(body, start, rested):
                 continue
-            again = (_raised(each) for each in nearby(rested, rng))
-            beside = (self._let_go(around, target, partner, each) for each in again)
-            if all(each is not None and all_rest(around, target, partner, goal, [each]) for each in beside):
+            again = (_raised(each) for each in perturbed_poses(rested, rng))
+            beside = (self._release_pose(around, target, partner, each) for each in again)
+            if all(each is not None and all_drops_succeed(around, target, partner, goal, [each]) for each in beside):
                 yield rested
 
-    def _let_go(self, around: Surroundings, target: int, partner: int, raised: np.ndarray) -> np.ndarray | None:
+    def _release_pose(self, around: Surroundings, target: int, partner: int, raised: np.ndarray) -> np.ndarray | None:
         """Return the pose a millimetre above the partner, straight below ``raised``; None if that misses the partner."""
         low_m = float(around.parts(partner).bounds[0][2])
-        lowered = lower(around.body(target), raised, [around.parts(partner)], low_m)
+        lowered = lower_to_contact(around.body(target), raised, [around.parts(partner)], low_m)
         if lowered is None or lowered.bounds[0][2] < low_m + ABOVE_M:
             return None
         return transform(translation=np.array([0.0, 0, ABOVE_M])) @ lowered.pose
@@ -87,20 +89,20 @@ def _raised(pose: np.ndarray) -> np.ndarray:
     return transform(translation=np.array([0.0, 0, RAISED_M])) @ pose
 
 
-def _as_it_is(body: PoolBody, object_to_world: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _with_random_heading(body: PoolBody, object_to_world: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Return a pose with the same tilt and random heading, with the lowest point at z = 0."""
     turned = transform(Rotation.from_rotvec([0, 0, rng.uniform(-np.pi, np.pi)]).as_matrix() @ object_to_world[:3, :3])
     turned[2, 3] = -body.parts.at(turned).bounds[0][2]
     return turned
 
 
-def _top(base: PlacedParts) -> Level | None:
+def _top(base: PlacedParts) -> LevelFace | None:
     """Return the level top of an object that can support another one, excluding rims; None if there is none."""
     top = level_end(base, top=True, within_m=LEVEL_M)
     return top if top is not None and top.depth_inside(top.middle_m) >= BROAD_M else None
 
 
-def _stayed(body: PoolBody, start: np.ndarray, end: np.ndarray) -> bool:
+def _is_unmoved(body: PoolBody, start: np.ndarray, end: np.ndarray) -> bool:
     """Tell whether an object rests as it was released: where it slid or toppled first, a placement is difficult."""
     center = body.body.center_of_mass_m[None]
     moved_m = float(np.linalg.norm(transform_points(end, center) - transform_points(start, center)))

@@ -16,7 +16,7 @@ from manitwin.episodes.skills.skill import SkillGoal, Surroundings
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody
-from manitwin.physics.sapien.granules import FILL_SHARE, fill
+from manitwin.physics.sapien.granules import FILL_SHARE, create_granule_fill
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.stacking import open_poses
 from manitwin.scenes.layouts.twin_frames import TwinFrame
@@ -70,13 +70,13 @@ class Pour(HeldSkill):
         stays = (Literal("upright", target.name), Literal("undisturbed", partner.name))
         return Goal((Literal(self.predicate, target.name, partner.name),), stays)
 
-    def set_goal(
+    def sample_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
         """Return the goal with granules in the target; None if it has no room for them."""
         name, body = around.objects[target].name, around.body(target)
-        found = super().set_goal(around, target, partner, rng)
-        granules = None if body.opening is None else fill(name, body.opening, body.body.hulls, rng)
+        found = super().sample_goal(around, target, partner, rng)
+        granules = None if body.opening is None else create_granule_fill(name, body.opening, body.body.hulls, rng)
         return None if found is None or granules is None else replace(found, granules=granules)
 
     def task(self, scene: HeldScene) -> HeldTask:

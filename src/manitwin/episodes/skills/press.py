@@ -10,7 +10,7 @@ from manitwin.episodes.goals.goal import SIGNATURES, Goal, Literal
 from manitwin.episodes.planning.closed_hand import first_corner
 from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.skills.held_skill import HeldSkill
-from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask
+from manitwin.episodes.skills.held_task import GuardedMove, HeldScene, HeldTask
 from manitwin.geometry.hulls.error import inside_any_hull
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
@@ -78,7 +78,7 @@ class Press(HeldSkill):
 
         asked_n = SIGNATURES[self.predicate].default
         assert asked_n is not None
-        guard = Guard(FREE_KNOTS, asked_n + MORE_N, speed_m_s=SPEED_M_S, touches=TOUCHES)
+        guard = GuardedMove(FREE_KNOTS, asked_n + MORE_N, speed_m_s=SPEED_M_S, touches=TOUCHES)
         return HeldTask(tuple(paths), empty=True, duration_s=1.0, measured=1, ending="keep", guard=guard, watch=watch)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.pick_place_tasks import MIN_GAP_M, footprint_at
 from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings
-from manitwin.episodes.skills.strokes import BEHIND_M, HEIGHT_SHARE, is_met
+from manitwin.episodes.skills.strokes import BEHIND_M, HEIGHT_SHARE, touches_near_edge
 from manitwin.geometry.boxes import footprint, separation_m
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
@@ -69,12 +69,14 @@ class Push(Skill):
             if float(way @ center) < MOST_INWARD * way_m * float(np.linalg.norm(center)):
                 continue
             hand = center - (np.linalg.norm(corners - center, axis=1).max() + BEHIND_M) * way / way_m
-            if not around.area.reaches(center + way, corners + way) or not around.area.wider().reaches(hand, corners):
+            if not around.area.is_reachable(center + way, corners + way) or not around.area.widened().is_reachable(
+                hand, corners
+            ):
                 continue
-            if all(separation_m(swept, each) >= MIN_GAP_M for each in taken) and is_met(moved, way / way_m):
+            if all(separation_m(swept, each) >= MIN_GAP_M for each in taken) and touches_near_edge(moved, way / way_m):
                 yield transform(None, np.array([*way, 0.0])) @ moved.object_to_world
 
-    def set_goal(
+    def sample_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
         """Return the goal with its mark; None if no place is free, or if the target would roll or fall over as it lies."""

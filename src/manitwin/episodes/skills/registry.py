@@ -22,7 +22,7 @@ from manitwin.episodes.skills.stir import Stir
 from manitwin.episodes.skills.strike import Strike
 from manitwin.episodes.skills.upright import Upright
 from manitwin.episodes.skills.wipe import Wipe
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 
 PICK_PLACE = "pick_place"
 """Moves an object to a random pose: its goal is that pose, not a literal."""
@@ -61,5 +61,5 @@ def load_skill(name: str) -> Skill | None:
     if name == PICK_PLACE:
         return None
     if name not in SKILLS:
-        raise UsageError(choose_from("skill", name, skill_names()))
+        raise UsageError(unknown_name_message("skill", name, skill_names()))
     return SKILLS[name]

@@ -51,7 +51,7 @@ class Surroundings:
         return boxes + [self.parts(number) for number in range(len(self.objects)) if number not in without]
 
 
-class FoundPoses(Sequence[np.ndarray]):
+class LazyPoses(Sequence[np.ndarray]):
     """Lazy sequence of poses ``(4, 4)``: most goals are planned with the first one or two."""
 
     def __init__(self, poses: Iterator[np.ndarray]):
@@ -102,7 +102,7 @@ class SkillGoal:
     ways: Sequence[np.ndarray] | None = None
 
     @property
-    def is_of_a_path(self) -> bool:
+    def has_path(self) -> bool:
         """Whether the goal is reached along a path instead of by the release pose."""
         return self.path is not None or self.pushes or self.hands_over
 
@@ -143,14 +143,14 @@ class Skill(ABC):
         """Return the placements in which the target should end; empty if the goal requires none."""
         return ()
 
-    def set_goal(
+    def sample_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
         """Return the goal in the given surroundings with its poses; None if there is none."""
-        return set_goal(self, around, target, partner, rng)
+        return sample_skill_goal(self, around, target, partner, rng)
 
 
-def set_goal(
+def sample_skill_goal(
     skill: Skill, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
 ) -> SkillGoal | None:
     """Return a skill's goal in the given surroundings with its poses.
@@ -164,7 +164,7 @@ def set_goal(
     own = np.random.default_rng(
         rng.integers(2**63)
     )  # own generator: the number of poses consumed does not affect other random draws
-    poses = FoundPoses(islice(skill.poses(around, target, partner, own), skill.most_poses))
+    poses = LazyPoses(islice(skill.poses(around, target, partner, own), skill.most_poses))
     if next(iter(poses), None) is None:
         return None
     numbers = (target, *([] if partner is None else [partner]))
@@ -189,7 +189,7 @@ def state_at_rest(around: Surroundings) -> WorldState:
     )
 
 
-def tries(draw: Callable[[], np.ndarray | None], count: int) -> Iterator[np.ndarray]:
+def successful_draws(draw: Callable[[], np.ndarray | None], count: int) -> Iterator[np.ndarray]:
     """Yield the results of ``count`` draws, without failed ones."""
     for _ in range(count):
         drawn = draw()

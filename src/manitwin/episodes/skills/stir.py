@@ -15,7 +15,7 @@ from manitwin.episodes.tool_watches import StirWatch
 from manitwin.geometry.cavity_floor import floor_below_rim
 from manitwin.geometry.frames.feature import UP, rotation_of
 from manitwin.geometry.poses import inverse, transform, transform_points
-from manitwin.physics.sapien.granules import fill
+from manitwin.physics.sapien.granules import create_granule_fill
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.stacking import open_poses
@@ -58,15 +58,15 @@ class Stir(HeldSkill):
         long_m = max(LEAST_LENGTH_M, SLENDER * extents[1], (inside_m + HAND_M) / FAR_END)
         return bool(extents[2] >= long_m and narrow)
 
-    def set_goal(
+    def sample_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
         """Return the goal with granules in the vessel; None if it has no room for them."""
         assert partner is not None
-        found, body = super().set_goal(around, target, partner, rng), around.body(partner)
+        found, body = super().sample_goal(around, target, partner, rng), around.body(partner)
         granules = None
         if body.opening is not None:
-            granules = fill(around.objects[partner].name, body.opening, body.body.hulls, rng)
+            granules = create_granule_fill(around.objects[partner].name, body.opening, body.body.hulls, rng)
         return None if found is None or granules is None else replace(found, granules=granules)
 
     def task(self, scene: HeldScene) -> HeldTask:
@@ -89,10 +89,10 @@ class Stir(HeldSkill):
                 down = np.sin(lean) * side - np.array([0.0, 0.0, np.cos(lean)])
                 turn = rotation_of(down, UP)  # keeps the upper side, where the hand is, up
                 above_m = FLOOR_M - float((points @ turn.T)[:, 2].min())
-                round_m = _round(center, opening.rim_radius_m, side)
+                round_m = _spiral(center, opening.rim_radius_m, side)
                 out_m = np.linalg.norm(round_m[:, :2] - center[:2], axis=1)
                 round_m[:, 2] = np.interp(out_m, outs_m, floors_m) + above_m
-                paths.append(HeldPath(_in_and_out(turn, center, round_m) @ inverse(stick)))
+                paths.append(HeldPath(_stirring_poses(turn, center, round_m) @ inverse(stick)))
 
         def rank(grasp: Grasp) -> float | None:
             tips = transform_points(grasp.gripper_to_object, np.array([[0.0, 0, scene.tip_depth_m]]))
@@ -130,7 +130,7 @@ def leans_rad(rim_radius_m: float, depth_m: float, thick_m: float) -> list[float
     return [float(lean) for lean in LEANS_RAD if depth_m * np.tan(lean) <= room_m]
 
 
-def _round(center_m: np.ndarray, rim_radius_m: float, side: np.ndarray) -> np.ndarray:
+def _spiral(center_m: np.ndarray, rim_radius_m: float, side: np.ndarray) -> np.ndarray:
     """Return positions ``(K, 3)`` of the end on an inward spiral, at the rim's height."""
     start, places = float(np.arctan2(side[1], side[0])), []
     for share in np.linspace(0, 1, KNOTS):
@@ -142,7 +142,7 @@ def _round(center_m: np.ndarray, rim_radius_m: float, side: np.ndarray) -> np.nd
     return np.array(places)
 
 
-def _in_and_out(turn: np.ndarray, center_m: np.ndarray, round_m: np.ndarray) -> np.ndarray:
+def _stirring_poses(turn: np.ndarray, center_m: np.ndarray, round_m: np.ndarray) -> np.ndarray:
     """Return poses ``(K, 4, 4)`` of the end: into the vessel from above, through positions ``(K, 3)``, and out again."""
     above = np.array([*round_m[0, :2], center_m[2] + ABOVE_M])
     halfway = (above + round_m[0]) / 2

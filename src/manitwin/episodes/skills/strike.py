@@ -12,9 +12,9 @@ from manitwin.episodes.planning.closed_hand import open_fingertips
 from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.held_skill import HeldSkill
-from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask
+from manitwin.episodes.skills.held_task import GuardedMove, HeldScene, HeldTask
 from manitwin.episodes.skills.skill import Surroundings
-from manitwin.geometry.frames.words import is_end
+from manitwin.geometry.frames.label_keywords import is_end_face_label
 from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
@@ -28,7 +28,7 @@ FINGERS_BEHIND_M = 0.005
 """Distance of the fingers behind the tool's face: otherwise they touch first, directly or as the tool turns in the hand."""
 # grasps whose levers differ by less count as equal: a heavy head turns in a hand that is far from it
 LEVER_STEP_M = 0.03
-BLOW = Guard(first=0, stop_n=1e-3, duration_s=0.5, beyond=1.7, touches=FREE_KNOTS)
+BLOW = GuardedMove(first=0, stop_n=1e-3, duration_s=0.5, beyond=1.7, touches=FREE_KNOTS)
 # duration of the whole path at the joint limits, which leaves 0.23 m/s at contact: 1.875 x 0.15 m / 1.2 s
 SLOWEST_S = 1.2
 
@@ -48,7 +48,7 @@ class Strike(HeldSkill):
 
     def fixture(self, around: Surroundings, target: int, rng: np.random.Generator) -> Fixture | None:
         """Draw a block in reach."""
-        place = around.area.draw(block(np.zeros(3), 0.0).footprint_m, [], rng)
+        place = around.area.sample_pose(block(np.zeros(3), 0.0).footprint_m, [], rng)
         if place is None:
             return None
         position_m = place[:3, 3] + [0.0, 0, around.area.support.height_m]
@@ -88,5 +88,5 @@ class Strike(HeldSkill):
 
 def striking_face(frames: tuple[TwinFrame, ...]) -> TwinFrame | None:
     """Return the first face labelled as a striking one."""
-    faces = (frame for frame in frames if frame.kind == "face" and is_end(frame.label))
+    faces = (frame for frame in frames if frame.kind == "face" and is_end_face_label(frame.label))
     return next(faces, None)

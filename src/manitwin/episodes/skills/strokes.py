@@ -36,7 +36,7 @@ def strokes(moved: PlacedObject, place_m: np.ndarray, fingertips_m: np.ndarray, 
     way = place_m[:2] - center[:2]
     along = way / max(float(np.linalg.norm(way)), 1e-9)
     points = transform_points(moved.object_to_world, np.concatenate(moved.body.hulls))
-    height_m = _pushed_at_m(points)
+    height_m = _push_height_m(points)
     behind_m = _behind(points, center, along, level_m + 2 * height_m)
     first_m, last_m = -behind_m - BEHIND_M, float(np.linalg.norm(way)) - behind_m + BEYOND_M
     knots = np.linspace(first_m, last_m, max(4, int(np.ceil((last_m - first_m) / KNOT_M)) + 1))
@@ -62,13 +62,13 @@ def arc_to(low: np.ndarray, along: np.ndarray) -> list[np.ndarray]:
     return [transform(None, np.array([*(-along * DOWN_BACK_M * each), DOWN_M * each**2])) @ low for each in DOWN]
 
 
-def is_met(moved: PlacedObject, along: np.ndarray) -> bool:
+def touches_near_edge(moved: PlacedObject, along: np.ndarray) -> bool:
     """Tell whether fingertips that move along ``(2,)`` towards an object's centre of mass touch it at its near edge.
 
     Checked over the middle of the band: the fingertips would pass over the handle of a spoon.
     """
     points = transform_points(moved.object_to_world, np.concatenate(moved.body.hulls))
-    level_m, height_m = float(points[:, 2].min()), _pushed_at_m(points)
+    level_m, height_m = float(points[:, 2].min()), _push_height_m(points)
     center = transform_points(moved.object_to_world, moved.body.center_of_mass_m[None])[0]
     behind_m = _behind(points, center, along, level_m + 2 * height_m)
     sideways = np.linspace(-BAND_M / 2, BAND_M / 2, 3)[:, None] * [-along[1], along[0], 0.0]
@@ -81,7 +81,7 @@ def is_met(moved: PlacedObject, along: np.ndarray) -> bool:
     return bool((hits_m <= FAR_M + LATE_M).all())
 
 
-def _pushed_at_m(points_m: np.ndarray) -> float:
+def _push_height_m(points_m: np.ndarray) -> float:
     """Return the height above the support at which the fingertips push an object with vertices ``(N, 3)``."""
     return float(np.clip(HEIGHT_SHARE * np.ptp(points_m[:, 2]), *HEIGHTS_M))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from manitwin.episodes.goals.spatial import UPRIGHT_RAD
 from manitwin.episodes.pick_place_tasks import footprints_of_others, free_poses
-from manitwin.episodes.skills.skill import FoundPoses, Skill, SkillGoal, Surroundings
+from manitwin.episodes.skills.skill import LazyPoses, Skill, SkillGoal, Surroundings
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 
 POSES, WAYS = 12, 12
@@ -48,16 +48,16 @@ class Upright(Skill):
         drawn = (placements[int(rng.integers(len(placements)))] for _ in range(POSES))
         yield from _free(around, target, drawn, rng)
 
-    def set_goal(
+    def sample_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
         """Return the goal with free intermediate poses, cycling through the placements in which the target does not stand."""
-        found, own = super().set_goal(around, target, partner, rng), np.random.default_rng(rng.integers(2**63))
+        found, own = super().sample_goal(around, target, partner, rng), np.random.default_rng(rng.integers(2**63))
         if found is None:
             return None
         standing = standing_poses(around.twin(target))
         others = [each for each in around.twin(target).poses if each not in standing]
-        return replace(found, ways=FoundPoses(_free(around, target, islice(cycle(others), WAYS), own)))
+        return replace(found, ways=LazyPoses(_free(around, target, islice(cycle(others), WAYS), own)))
 
 
 def _free(

@@ -12,10 +12,10 @@ from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.held_skill import HeldSkill, board_in_reach
-from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask, Regulated
+from manitwin.episodes.skills.held_task import ForceControlledMove, GuardedMove, HeldScene, HeldTask
 from manitwin.episodes.skills.skill import Surroundings
 from manitwin.episodes.tool_watches import FACE_M, WIPING_N, WipeWatch
-from manitwin.geometry.frames.words import wipes
+from manitwin.geometry.frames.label_keywords import is_wiping_face
 from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
@@ -42,7 +42,8 @@ class Wipe(HeldSkill):
         """Accept an object at least 15 mm thick behind a wiping face: any face of a sponge or soap, the bristles of a brush."""
         points = pool.body(target.twin_id).parts.whole
         return any(
-            wipes(target.category, face.label) and np.ptp(points @ face.frame_to_object[:3, 2]) >= LEAST_THICK_M
+            is_wiping_face(target.category, face.label)
+            and np.ptp(points @ face.frame_to_object[:3, 2]) >= LEAST_THICK_M
             for face in wiping_faces(target.frames)
         )
 
@@ -100,8 +101,8 @@ class Wipe(HeldSkill):
             longest_s=15.0,
             measured=1,
             ending="put_back",
-            guard=Guard(FREE_KNOTS, WIPING_N[0], speed_m_s=DESCENT_M_S),
-            regulated=Regulated(first, WIPED_N, patch[:3, 2], STROKE_M_S),
+            guard=GuardedMove(FREE_KNOTS, WIPING_N[0], speed_m_s=DESCENT_M_S),
+            regulated=ForceControlledMove(first, WIPED_N, patch[:3, 2], STROKE_M_S),
             rises=True,
             watch=watch,
         )

@@ -9,7 +9,7 @@ from manitwin.geometry.boxes import smallest_enclosing_circle
 from manitwin.geometry.hull_distance import PlacedParts
 from manitwin.geometry.poses import rotation_between, transform, transform_points
 from manitwin.scenes.layouts.pool import PoolBody
-from manitwin.scenes.layouts.stacking import RIM_SLACK, Mouth, lower
+from manitwin.scenes.layouts.stacking import RIM_SLACK, ContainerOpening, lower_to_contact
 
 LET_GO_M = 0.04  # depth of the lower end below the rim: a hand that goes deeper collides with the rim
 LEAST_ROOM_M = 0.004  # clearance around an object on end
@@ -18,8 +18,8 @@ ABOVE_RIM_M = 0.02  # start height of lowering
 END_M = 0.01  # of a leaning object, everything within this height of its lowest point is its lower end
 
 
-def on_end(
-    body: PoolBody, vessel: PlacedParts, mouth: Mouth, rng: np.random.Generator, *, deep: bool
+def pose_on_end(
+    body: PoolBody, vessel: PlacedParts, mouth: ContainerOpening, rng: np.random.Generator, *, deep: bool
 ) -> np.ndarray | None:
     """Draw a pose ``(4, 4)`` on end, its lower end below the rim, or ``deep``, just above contact, which shortens the fall.
 
@@ -32,8 +32,8 @@ def on_end(
     return pose if lowered is None else lowered
 
 
-def as_it_is(
-    body: PoolBody, rotation: np.ndarray, vessel: PlacedParts, mouth: Mouth, rng: np.random.Generator
+def pose_in_orientation(
+    body: PoolBody, rotation: np.ndarray, vessel: PlacedParts, mouth: ContainerOpening, rng: np.random.Generator
 ) -> np.ndarray | None:
     """Draw a pose ``(4, 4)`` with ``rotation (3, 3)`` and a random heading, so that a present grasp remains usable.
 
@@ -43,8 +43,8 @@ def as_it_is(
     return None if pose is None else _lowered_below_rim(body, pose, vessel, mouth)
 
 
-def leaning(
-    body: PoolBody, rotation: np.ndarray, vessel: PlacedParts, mouth: Mouth, rng: np.random.Generator
+def leaning_pose(
+    body: PoolBody, rotation: np.ndarray, vessel: PlacedParts, mouth: ContainerOpening, rng: np.random.Generator
 ) -> np.ndarray | None:
     """Draw a pose ``(4, 4)`` with ``rotation (3, 3)`` tilted by up to 90 degrees, one end of its longer side below the rim.
 
@@ -66,7 +66,7 @@ def leaning(
 
 
 def _within(
-    body: PoolBody, rotation: np.ndarray, mouth: Mouth, depth_m: float, rng: np.random.Generator
+    body: PoolBody, rotation: np.ndarray, mouth: ContainerOpening, depth_m: float, rng: np.random.Generator
 ) -> np.ndarray | None:
     """Draw a pose within the rim with the lower end ``depth_m`` below it; None if the object is too wide."""
     turned = body.parts.whole @ rotation.T
@@ -79,12 +79,14 @@ def _within(
     return transform(rotation, np.array([*at, mouth.center_m[2] - depth_m - turned[:, 2].min()]))
 
 
-def _lowered(body: PoolBody, pose: np.ndarray, vessel: PlacedParts, mouth: Mouth) -> np.ndarray | None:
-    lowered = lower(body, pose, [vessel], mouth.center_m[2] - 2 * mouth.depth_m)
+def _lowered(body: PoolBody, pose: np.ndarray, vessel: PlacedParts, mouth: ContainerOpening) -> np.ndarray | None:
+    lowered = lower_to_contact(body, pose, [vessel], mouth.center_m[2] - 2 * mouth.depth_m)
     return None if lowered is None else transform(translation=np.array([0.0, 0, FREE_FALL_M])) @ lowered.pose
 
 
-def _lowered_below_rim(body: PoolBody, pose: np.ndarray, vessel: PlacedParts, mouth: Mouth) -> np.ndarray | None:
+def _lowered_below_rim(
+    body: PoolBody, pose: np.ndarray, vessel: PlacedParts, mouth: ContainerOpening
+) -> np.ndarray | None:
     lowered = _lowered(body, pose, vessel, mouth)
     if lowered is None or transform_points(lowered, body.parts.whole)[:, 2].min() > mouth.center_m[2]:
         return None

@@ -16,10 +16,10 @@ from manitwin.dataset.statistics.style import (
     INK,
     RED,
     Figure,
-    beside_bar,
     canvas,
     count_axis,
-    finished,
+    export_figure,
+    label_bar,
     legend_above,
     row_canvas,
     shortened,
@@ -49,7 +49,7 @@ def lengths(histogram: Result, summary: Result) -> tuple[Figure, bytes] | None:
         f"Histogram of the lengths of {row['objects']} kept episodes, from {row['min']:.3g} to {row['max']:.3g} s, "
         f"mean {row['mean']:.3g} s, median {row['median']:.3g} s."
     )
-    return finished(figure, "lengths", caption, alt, histogram), _png(figure)
+    return export_figure(figure, "lengths", caption, alt, histogram), _png(figure)
 
 
 def placement(histogram: Result, summary: Result) -> Figure | None:
@@ -68,7 +68,7 @@ def placement(histogram: Result, summary: Result) -> Figure | None:
         f"{row['p90']:.3g} mm, largest {row['max']:.3g} mm."
     )
     caption = "Position errors of objects that were placed, in steps of 1 mm."
-    return finished(figure, "placement", caption, alt, histogram)
+    return export_figure(figure, "placement", caption, alt, histogram)
 
 
 def outcomes(result: Result) -> Figure | None:
@@ -80,11 +80,11 @@ def outcomes(result: Result) -> Figure | None:
     colors = [BLUE if row["outcome"] == "kept" else RED for row in rows]
     axis.barh(np.arange(len(rows)), [row["attempts"] for row in rows], color=colors, height=0.7)
     for y, row in enumerate(rows):
-        beside_bar(axis, row["attempts"], y, f"{row['attempts']:,} ({100 * row['share']:.1f} %)")
+        label_bar(axis, row["attempts"], y, f"{row['attempts']:,} ({100 * row['share']:.1f} %)")
     axis.margins(x=0.15)
     count_axis(axis, "x", "attempts")
     alt = "Bars of attempts by outcome: " + "; ".join(f"{row['outcome']} {row['attempts']}" for row in rows) + "."
-    return finished(figure, "outcomes", "What became of the attempts.", alt, result)
+    return export_figure(figure, "outcomes", "What became of the attempts.", alt, result)
 
 
 def categories(result: Result) -> Figure | None:
@@ -97,7 +97,7 @@ def categories(result: Result) -> Figure | None:
     axis.barh(where, [row["attempted"] for row in rows], color=GREY, alpha=0.45, height=0.7, label="attempted")
     axis.barh(where, [row["kept"] for row in rows], color=BLUE, height=0.7, label="kept")
     for y, row in enumerate(rows):
-        beside_bar(axis, row["attempted"], y, f"{100 * row['kept_share']:.0f} %")
+        label_bar(axis, row["attempted"], y, f"{100 * row['kept_share']:.0f} %")
     axis.margins(x=0.1)
     count_axis(axis, "x", "episodes")
     legend_above(axis, 2, handlelength=1)
@@ -105,7 +105,7 @@ def categories(result: Result) -> Figure | None:
     more = len(result.rows) - len(rows)
     caption = "Attempted and kept episodes by category" + (f"; {more} more are in the table." if more else ".")
     alt = f"Bars of kept episodes of those attempted by category. {listed}."
-    return finished(figure, "categories", caption, alt, result)
+    return export_figure(figure, "categories", caption, alt, result)
 
 
 def _histogram(result: Result, width: float) -> tuple[Canvas, Axes]:

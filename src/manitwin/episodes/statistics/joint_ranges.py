@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from manitwin.episodes.hdf5_file import EpisodeFile
-from manitwin.episodes.stored_episode import RecordedRobot, robot_from
+from manitwin.episodes.stored_episode import RecordedRobot, robot_from_dict
 from manitwin.errors import EpisodesError
 
 SCHEMA = pa.schema(
@@ -30,7 +30,7 @@ def joint_ranges(files: Iterable[Path]) -> pa.Table:
     for path in files:
         with EpisodeFile(path) as file:
             for number in range(len(file)):
-                robot = robot_from(file.said(number)["robot"])
+                robot = robot_from_dict(file.metadata(number)["robot"])
                 joints, group = len(robot.arm_joints), f"traj_{number}/obs/agent"
                 both = [file.content.array(f"{group}/{name}") for name in ("qpos", "qvel")]
                 if any(each.ndim != 2 or each.shape[1] < joints or not len(each) for each in both):

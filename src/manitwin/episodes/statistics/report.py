@@ -14,12 +14,12 @@ from manitwin.dataset.statistics.page import (
     REPORT,
     Report,
     ReportSection,
+    html_cell,
     report_section,
     write_or_remove,
-    written,
 )
 from manitwin.dataset.statistics.query import Column, ReportTables, Result, Row
-from manitwin.dataset.statistics.style import Figure, drawing
+from manitwin.dataset.statistics.style import Figure, report_style
 from manitwin.episodes.attempts import ATTEMPTS, REMEDY, SCHEMA
 from manitwin.episodes.statistics import figures as drawn
 from manitwin.episodes.statistics import queries as q
@@ -81,7 +81,7 @@ def histogram_text(caption: str, rows: Sequence[tuple[str, int]]) -> str:
 
 
 def _cell(column: Column, row: Row) -> str:
-    html = written(column, row)
+    html = html_cell(column, row)
     plain = unescape(html.replace('<span class="interval">', "").replace("</span>", ""))
     return plain if len(plain) <= _WIDEST else plain[: _WIDEST - 1] + "…"
 
@@ -119,7 +119,7 @@ class EpisodeReport:
 
     def write(self, out: Path) -> Path:
         """Write ``report.html``, ``statistics.json`` and ``figures/`` into a folder; return the path of the page."""
-        with drawing():
+        with report_style():
             figures, lengths_png = self._draw()
         lead, sections = [self.summary], self._sections(figures)
         Report(self.title, lead, q.PRELUDE, VIEWS, self.results, figures, sections).write(out)

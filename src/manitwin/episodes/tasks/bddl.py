@@ -32,7 +32,7 @@ class Bddl:
 def bddl_of(task: TaskRecord, scene: SceneRecord) -> Bddl:
     """Return a task in a scene as BDDL: the goal's literals; ``stays`` literals are omitted."""
     goal = task.parsed_goal
-    unsaid = tuple(str(each) for each in goal.literals if not _can_be_said(each))
+    unsaid = tuple(str(each) for each in goal.literals if not _is_expressible(each))
     if unsaid:
         return Bddl(None, unsaid)
     categories = {each.name: _symbol(each.category) for each in scene.objects}
@@ -68,7 +68,7 @@ def write_bddl(tasks: Sequence[TaskRecord], scenes: dict[str, SceneRecord], fold
     return written, len(tasks) - written
 
 
-def _can_be_said(literal: Literal) -> bool:
+def _is_expressible(literal: Literal) -> bool:
     return literal.predicate in PREDICATES and literal.second is not None and literal.value is None
 
 

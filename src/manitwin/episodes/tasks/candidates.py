@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 from manitwin.episodes.goals.evaluation import evaluate
 from manitwin.episodes.goals.goal import Goal, Literal
-from manitwin.episodes.goals.goal_instructions import tells_fixture
-from manitwin.episodes.naming import tells_apart
-from manitwin.episodes.skills.hands import skills_of
+from manitwin.episodes.goals.goal_instructions import is_fixture_unambiguous
+from manitwin.episodes.naming import is_distinguishable
+from manitwin.episodes.skills.robot_compatibility import skills_of
 from manitwin.episodes.tasks.task_record import kind_of
 from manitwin.episodes.tasks.task_scene import TaskScene
 
 
 @dataclass(frozen=True)
-class Action:
+class SkillAction:
     """A skill applied to a target and a partner, by their numbers in the scene, with its goal."""
 
     skill: str
@@ -39,7 +39,7 @@ class Action:
 class Candidate:
     """One action, or several in order."""
 
-    actions: tuple[Action, ...]
+    actions: tuple[SkillAction, ...]
 
     @property
     def kind(self) -> str:
@@ -47,12 +47,12 @@ class Candidate:
         return "+".join(sorted(action.kind for action in self.actions))
 
 
-def single_actions(scene: TaskScene, dropped: Counter[str]) -> list[Action]:
+def single_actions(scene: TaskScene, dropped: Counter[str]) -> list[SkillAction]:
     """Return every action allowed by sizes, openings, reach and names, each literal once; count rejections in ``dropped``."""
-    found: dict[str, Action] = {}
+    found: dict[str, SkillAction] = {}
     able = []
     for number in range(len(scene.objects)):
-        why = scene.why_not_taken(number)
+        why = scene.grasp_rejection(number)
         if why is None:
             able.append(number)
         else:
@@ -72,16 +72,16 @@ def single_actions(scene: TaskScene, dropped: Counter[str]) -> list[Action]:
                 if key in found:
                     continue  # the same goal by another skill
                 others = [twin.category for number, twin in enumerate(twins) if number != target]
-                if {target, partner} & unnamed or not tells_fixture(skill.predicate, others):
+                if {target, partner} & unnamed or not is_fixture_unambiguous(skill.predicate, others):
                     dropped["ambiguous_name"] += 1
                 elif _is_true_already(scene, goal):
                     dropped["true_already"] += 1
                 else:
-                    found[key] = Action(skill.name, target, partner, goal)
+                    found[key] = SkillAction(skill.name, target, partner, goal)
     return list(found.values())
 
 
-def pairs_of(actions: list[Action]) -> Iterator[Candidate]:
+def pairs_of(actions: list[SkillAction]) -> Iterator[Candidate]:
     """Yield ordered pairs of actions of which the second does not undo the first."""
     for first in actions:
         for second in actions:
@@ -89,7 +89,7 @@ def pairs_of(actions: list[Action]) -> Iterator[Candidate]:
                 yield Candidate((first, second))
 
 
-def undoes(first: Action, second: Action) -> bool:
+def undoes(first: SkillAction, second: SkillAction) -> bool:
     """Tell whether the second action moves the first one's partner, or repeats its predicate or partner for the same target."""
     if second.target == first.partner or (first.target, first.kind) == (second.target, second.kind):
         return True
@@ -100,7 +100,7 @@ def _is_named(scene: TaskScene, number: int) -> bool:
     """Tell whether an object has a name that fits no other object of the scene."""
     name = scene.names[number]
     others = [language for other, language in scene.words.items() if other != name]
-    return name in scene.words and tells_apart(scene.words[name], others)
+    return name in scene.words and is_distinguishable(scene.words[name], others)
 
 
 def _is_true_already(scene: TaskScene, goal: Goal) -> bool:

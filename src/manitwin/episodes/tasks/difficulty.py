@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from manitwin.episodes.pick_place_tasks import footprint_at
-from manitwin.episodes.tasks.checking import Planned
+from manitwin.episodes.tasks.feasibility_check import PlannedTask
 from manitwin.episodes.tasks.task_record import TaskDifficulty
 from manitwin.episodes.tasks.task_scene import TaskScene
 from manitwin.geometry.boxes import separation_m, smallest_enclosing_circle
@@ -13,15 +13,15 @@ TIGHT_M = 0.01  # clearance between an inserted object and the rim
 MANY_GRASPS = 10
 
 
-def difficulty_of(scene: TaskScene, planned: Planned) -> TaskDifficulty:
+def difficulty_of(scene: TaskScene, planned: PlannedTask) -> TaskDifficulty:
     """Return the counts of literals, functional frames, close neighbours and tight fits, and whether many grasps were tried."""
     steps, goals = planned.sequence.steps, [step.goal for step in planned.sequence.steps]
     parts = {
         "literals": len(steps),
-        "functional_frames": sum(goal.is_of_a_path for goal in goals),
+        "functional_frames": sum(goal.has_path for goal in goals),
         "close_neighbours": sum(_is_close(scene, action.target) for action in planned.candidate.actions),
         "tight_fits": sum(
-            not goal.is_of_a_path and action.partner is not None and _is_tight(scene, action.target, action.partner)
+            not goal.has_path and action.partner is not None and _is_tight(scene, action.target, action.partner)
             for goal, action in zip(goals, planned.candidate.actions, strict=True)
             if action.goal.literals[0].second in goal.openings
         ),

@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, create_model
 
-from manitwin.episodes.skills.hands import skills_of
-from manitwin.episodes.tasks.candidates import Action, Candidate, single_actions, undoes
+from manitwin.episodes.skills.robot_compatibility import skills_of
+from manitwin.episodes.tasks.candidates import Candidate, SkillAction, single_actions, undoes
 from manitwin.episodes.tasks.task_scene import TaskScene
 from manitwin.models.vlm.client import ChatClient
 from manitwin.models.vlm.protocol import Question
@@ -34,8 +34,8 @@ def propose(scene: TaskScene, chat: ChatClient, count: int) -> tuple[list[Candid
     answer = answer_type(scene)
     question = Question(
         "task_proposals",
-        INSTRUCTIONS.format(robot=_who(scene.robot)),
-        (described(scene, count),),
+        INSTRUCTIONS.format(robot=_robot_description(scene.robot)),
+        (scene_description(scene, count),),
         strict_schema(answer),
     )
     said: Any = ask(chat, question, answer).value
@@ -48,7 +48,7 @@ def propose(scene: TaskScene, chat: ChatClient, count: int) -> tuple[list[Candid
             key = literal.predicate.value, literal.a.value, None if second == NOTHING else second
             actions.append(possible.get(key))
         chosen = [action for action in actions if action is not None]
-        why = _why_not(actions, len(task.literals), chosen)
+        why = _rejection_reason(actions, len(task.literals), chosen)
         if why is not None:
             thrown[f"proposed_{why}"] += 1
         else:
@@ -69,7 +69,7 @@ def answer_type(scene: TaskScene) -> type[BaseModel]:
     return create_model("TaskProposals", __config__=strict, tasks=(list[task], ...))  # type: ignore[valid-type]
 
 
-def described(scene: TaskScene, count: int) -> str:
+def scene_description(scene: TaskScene, count: int) -> str:
     """Return a textual description of the objects, their positions, and the predicates."""
     lines = [
         f"Propose up to {count} tasks. The objects, as the robot at the origin sees them (x ahead, y to its left, metres):"
@@ -84,14 +84,14 @@ def described(scene: TaskScene, count: int) -> str:
     return "\n".join(lines)
 
 
-def _who(robot: Robot) -> str:
+def _robot_description(robot: Robot) -> str:
     if robot.arms:
         return "two robot arms with two-finger grippers that face each other"
     hands = {"parallel": "a two-finger gripper", "suction": "a suction cup"}
     return f"a robot arm with {hands.get(robot.gripper.kind, 'a hand of several fingers')}"
 
 
-def _why_not(actions: list[Action | None], literals: int, chosen: list[Action]) -> str | None:
+def _rejection_reason(actions: list[SkillAction | None], literals: int, chosen: list[SkillAction]) -> str | None:
     if not 1 <= literals <= MOST_LITERALS:
         return "wrong_number_of_literals"
     if len(chosen) < len(actions):
@@ -99,6 +99,6 @@ def _why_not(actions: list[Action | None], literals: int, chosen: list[Action]) 
     return "undoes_first" if len(chosen) > 1 and undoes(*chosen) else None
 
 
-def _key(action: Action) -> tuple[str, str, str | None]:
+def _key(action: SkillAction) -> tuple[str, str, str | None]:
     literal = action.literal
     return literal.predicate, literal.subject, literal.second if action.partner is not None else None

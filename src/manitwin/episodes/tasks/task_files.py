@@ -13,7 +13,7 @@ from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import decode_text, read_bytes
 from manitwin.formats.json_file import parse_json_object
 from manitwin.formats.printable import printable_line
-from manitwin.formats.schema_version import is_newer, of_newer_schema
+from manitwin.formats.schema_version import is_newer, newer_schema_message
 from manitwin.twin.store import write_bytes_atomically
 
 TASKS = "tasks.jsonl"
@@ -54,7 +54,7 @@ def _task(line: str, where: str) -> TaskRecord:
     said = parse_json_object(line, where, UsageError, remedy=_REMEDY)
     version = said.get("schema_version")
     if is_newer(version, TASK_SCHEMA_VERSION):
-        raise UsageError(of_newer_schema(where, version, TASK_SCHEMA_VERSION))
+        raise UsageError(newer_schema_message(where, version, TASK_SCHEMA_VERSION))
     if version != TASK_SCHEMA_VERSION:
         shown = printable_line(str(version), max_characters=40)
         raise UsageError(f"{where}: task version {shown}, this package reads {TASK_SCHEMA_VERSION}; {_REMEDY}")

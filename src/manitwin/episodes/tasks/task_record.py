@@ -17,11 +17,11 @@ _Name = Annotated[str, StringConstraints(pattern=r"^[0-9A-Za-z_][0-9A-Za-z_. -]{
 _Words = Annotated[str, StringConstraints(min_length=1, max_length=500)]
 
 
-class _Said(BaseModel):
+class _StrictModel(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-class TaskStep(_Said):
+class TaskStep(_StrictModel):
     """The skill for one literal, with its target and optional partner."""
 
     skill: _Name
@@ -29,7 +29,7 @@ class TaskStep(_Said):
     partner: _Name | None = None
 
 
-class TaskDifficulty(_Said):
+class TaskDifficulty(_StrictModel):
     """Difficulty of a task: ``score`` is the sum of the other fields, whose counts docs/tasks.md defines."""
 
     score: int = Field(ge=1)
@@ -40,7 +40,7 @@ class TaskDifficulty(_Said):
     hard_to_plan: int = Field(ge=0)
 
 
-class TaskRecord(_Said):
+class TaskRecord(_StrictModel):
     """A task in a scene; its ``steps`` achieve the ``goal``'s literals in order.
 
     ``scene_sha256`` is the digest of the scene's file, ``seed`` determines the poses of fixtures and placements. ``held_out``

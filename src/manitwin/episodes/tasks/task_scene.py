@@ -12,7 +12,7 @@ from manitwin.episodes.goals.world_state import ObjectState, WorldState
 from manitwin.episodes.pick_place_tasks import PlacingArea
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
 from manitwin.episodes.sealing_surface import with_surface
-from manitwin.episodes.sequence import Step
+from manitwin.episodes.sequence import GoalStep
 from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings, openings_of
 from manitwin.episodes.target_grasps import TargetGrasp, shuffled
 from manitwin.geometry.rigid_body import PlacedObject
@@ -69,7 +69,7 @@ class TaskScene:
         }
         return WorldState(objects, frozenset())
 
-    def why_not_taken(self, number: int) -> str | None:
+    def grasp_rejection(self, number: int) -> str | None:
         """Return why an object cannot be grasped: ``carries_another``, ``out_of_reach`` or ``no_grasp``; None if it can."""
         placed = self.objects[number]
         if placed.name in {each.supported_by for each in self.scene.record.objects}:
@@ -78,7 +78,7 @@ class TaskScene:
             return "out_of_reach"
         return None if self.grasps(placed.twin_id) else "no_grasp"
 
-    def around(self, number: int) -> Surroundings:
+    def surroundings(self, number: int) -> Surroundings:
         """Return the surroundings for moving one object, which stays on its support surface."""
         record = self.scene.record
         surface = next(each.surface for each in record.objects if each.name == self.names[number])
@@ -95,23 +95,25 @@ class TaskScene:
         found = self.grasps(self.objects[number].twin_id)
         return tuple(each.grasp for each in shuffled(found, np.random.default_rng([seed, 1])))
 
-    def beforehand(self, skill: Skill, target: int, partner: int | None, seed: int, number: int) -> SkillGoal | None:
+    def goal_before_execution(
+        self, skill: Skill, target: int, partner: int | None, seed: int, number: int
+    ) -> SkillGoal | None:
         """Return a skill's goal before anything has moved; for a later step without poses, which are sampled when it starts.
 
         ``number`` is the number of the step. None if there is no goal or no room for its fixtures.
         """
-        around, rng = self.around(target), np.random.default_rng((seed, 2, number))
-        if number == 0 or type(skill).set_goal is not Skill.set_goal:
-            return skill.set_goal(around, target, partner, rng)
+        around, rng = self.surroundings(target), np.random.default_rng((seed, 2, number))
+        if number == 0 or type(skill).sample_goal is not Skill.sample_goal:
+            return skill.sample_goal(around, target, partner, rng)
         second = None if partner is None else self.objects[partner]
         numbers = (target, *([] if partner is None else [partner]))
         goal = skill.goal(self.objects[target], second)
         return SkillGoal(goal, (), None if second is None else second.name, openings_of(around, numbers))
 
-    def step(self, skill: Skill, target: int, partner: int | None, seed: int, number: int) -> Step | None:
+    def step(self, skill: Skill, target: int, partner: int | None, seed: int, number: int) -> GoalStep | None:
         """Return a step with its goal before execution; None if there is none."""
-        goal = self.beforehand(skill, target, partner, seed, number)
+        goal = self.goal_before_execution(skill, target, partner, seed, number)
         if goal is None:
             return None
         second = None if partner is None else self.names[partner]
-        return Step(skill, self.names[target], second, self.grasps_of(target, seed), goal)
+        return GoalStep(skill, self.names[target], second, self.grasps_of(target, seed), goal)

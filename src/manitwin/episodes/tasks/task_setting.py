@@ -14,8 +14,8 @@ from manitwin.episodes.setting import Setting
 from manitwin.episodes.skills.registry import load_skill
 from manitwin.episodes.skills.skill import SkillGoal
 from manitwin.episodes.target_grasps import TargetGrasp
-from manitwin.episodes.tasks.candidates import Action
-from manitwin.episodes.tasks.checking import NoTask, sequence_of
+from manitwin.episodes.tasks.candidates import SkillAction
+from manitwin.episodes.tasks.feasibility_check import InfeasibleTask, sequence_of
 from manitwin.episodes.tasks.task_record import TaskRecord
 from manitwin.episodes.tasks.task_scene import TaskScene
 from manitwin.errors import UsageError
@@ -39,7 +39,7 @@ class TaskSetting:
     sequence: GoalSequence
 
     @property
-    def several(self) -> GoalSequence | None:
+    def multi_step_sequence(self) -> GoalSequence | None:
         """The sequence, or None if it has a single step."""
         return self.sequence if len(self.sequence.steps) > 1 else None
 
@@ -65,7 +65,7 @@ def task_setting(
     scene = TaskScene(Scene(record, TwinSource(dataset)), pool, robot, grasps)
     try:
         sequence = sequence_of(scene, [_action(scene, task, number) for number in range(len(task.steps))], task.seed)
-    except NoTask:
+    except InfeasibleTask:
         return None
     goal = replace(sequence.goal, goal=task.parsed_goal)
     first = sequence.steps[0]
@@ -81,7 +81,7 @@ def task_setting(
     return TaskSetting(task, scene, problem, goal, sequence)
 
 
-def _action(scene: TaskScene, task: TaskRecord, number: int) -> Action:
+def _action(scene: TaskScene, task: TaskRecord, number: int) -> SkillAction:
     step = task.steps[number]
     skill = load_skill(step.skill)
     if skill is None:
@@ -89,4 +89,4 @@ def _action(scene: TaskScene, task: TaskRecord, number: int) -> Action:
     target = scene.names.index(step.target)
     partner = None if step.partner is None else scene.names.index(step.partner)
     second = None if partner is None else scene.objects[partner]
-    return Action(skill.name, target, partner, skill.goal(scene.objects[target], second))
+    return SkillAction(skill.name, target, partner, skill.goal(scene.objects[target], second))

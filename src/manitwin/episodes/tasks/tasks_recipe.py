@@ -14,7 +14,7 @@ import numpy as np
 from manitwin.config import Resource
 from manitwin.engine.folder_recipe import FolderRecipe, FolderRecord
 from manitwin.engine.recipe import Ending, Identity
-from manitwin.engine.stage import Draft, Stage, tell_part
+from manitwin.engine.stage import Draft, Stage, report_progress
 from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
@@ -22,19 +22,19 @@ from manitwin.episodes.planning.two_arms import planner_of
 from manitwin.episodes.settings import TasksConfig
 from manitwin.episodes.target_grasps import TargetGrasp, usable_grasps
 from manitwin.episodes.tasks.candidates import Candidate
-from manitwin.episodes.tasks.checking import Planned
 from manitwin.episodes.tasks.difficulty import difficulty_of
-from manitwin.episodes.tasks.drawing import Tally, draw_tasks
-from manitwin.episodes.tasks.phrasings import task_instructions
+from manitwin.episodes.tasks.feasibility_check import PlannedTask
 from manitwin.episodes.tasks.proposals import propose
 from manitwin.episodes.tasks.task_files import TASKS, tasks_bytes
+from manitwin.episodes.tasks.task_instructions import task_instructions
 from manitwin.episodes.tasks.task_record import TaskRecord, TaskStep, kind_of, task_id_of
+from manitwin.episodes.tasks.task_sampling import CandidateCounts, sample_tasks
 from manitwin.episodes.tasks.task_scene import TaskScene
 from manitwin.errors import Rejected, UsageError
 from manitwin.models.vlm.chat_from_spec import chat_of
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
-from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.layouts.pool import cached_pool
 from manitwin.scenes.loaded_scene import Scene
 from manitwin.scenes.scene_files import scene_bytes, scene_name
 from manitwin.twin.loaded_twin import TwinSource
@@ -99,12 +99,12 @@ class TasksStage:
     def run(self, draft: Draft[TaskedScene], folder: Path) -> dict[str, Any]:
         """Write the scene's tasks, and the counts of its candidates."""
         loaded = Scene.read(Path(self._scenes) / scene_name(draft.payload.scene_id), self._dataset)
-        scene = TaskScene(loaded, pool_of(self._dataset), self._robot, self._grasps)
+        scene = TaskScene(loaded, cached_pool(self._dataset), self._robot, self._grasps)
         key = [draft.seed, int(sha256(draft.payload.scene_id.encode()).hexdigest()[:8], 16)]
         proposed, thrown = self._proposed(scene)
-        drawn, tally = draw_tasks(
+        drawn, tally = sample_tasks(
             scene, self._planner, self.settings, np.random.default_rng(key), proposed,
-            lambda found: tell_part(found, self.settings.per_scene, "tasks"),
+            lambda found: report_progress(found, self.settings.per_scene, "tasks"),
         )  # fmt: skip
         tally.dropped.update(thrown)
         digest = sha256(scene_bytes(loaded.record)).hexdigest()
@@ -118,7 +118,13 @@ class TasksStage:
         return ([], {}) if chat is None else propose(scene, chat, self.settings.proposals)
 
     def _record(
-        self, scene: TaskScene, scene_sha256: str, planned: Planned, seed: int, proposed: bool, tally: Tally
+        self,
+        scene: TaskScene,
+        scene_sha256: str,
+        planned: PlannedTask,
+        seed: int,
+        proposed: bool,
+        tally: CandidateCounts,
     ) -> TaskRecord | None:
         steps = tuple(
             TaskStep(skill=each.skill.name, target=each.target, partner=each.partner) for each in planned.sequence.steps
@@ -193,7 +199,7 @@ class TasksRecipe(FolderRecipe[SceneTasksRecord]):
         write_bytes_atomically(fresh / TASKS, content)
         write_bytes_atomically(fresh / COUNTS, counts)
         said = {"schema_version": 1, "scene_id": draft.item_id, "tasks": content.count(b"\n")}
-        return self.seal(fresh, said, decided_by=[content.decode(), json.loads(counts)])
+        return self.write_record(fresh, said, decided_by=[content.decode(), json.loads(counts)])
 
     def ending(self, record: SceneTasksRecord) -> Ending:
         """Return the ending stated by a scene's record."""

@@ -64,7 +64,7 @@ def make_tasks(
     """
     robot = load_robot(config.robot)
     chat_of(config.vlm, "propose tasks")
-    source, root = EpisodesSource.of(scenes, twins), DatasetRoot(out)
+    source, root = EpisodesSource.detect(scenes, twins), DatasetRoot(out)
     if source.scenes is None:
         raise UsageError(f"{scenes}: no scenes; `manitwin layout DATASET -o SCENES` makes some")
     source.check_grippers(robot)
@@ -85,14 +85,14 @@ def collect_tasks(out: Path, config: TasksConfig) -> TaskTotals:
     """Write all scenes' tasks into one file, and the report; return the totals."""
     folders = sorted(path.parent for path in (out / SCENE_TASKS).glob(f"*/*/{TASKS}"))
     everything = [task for folder in folders for task in read_tasks(folder)]
-    kept, dropped = evened(everything, config.most_of_kind, config.two_literal_share)
+    kept, dropped = balanced_tasks(everything, config.most_of_kind, config.two_literal_share)
     totals = _totals(folders, kept, dropped)
     write_tasks(out / TASKS, kept)
     write_bytes_atomically(out / REPORT, canonical_json(asdict(totals)).encode())
     return totals
 
 
-def evened(
+def balanced_tasks(
     tasks: Sequence[TaskRecord], most_of_kind: float, two_literal_share: float
 ) -> tuple[list[TaskRecord], Counter[str]]:
     """Remove tasks, last ones first, until no kind is too frequent and two-literal tasks are not too rare; return the rest."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from manitwin.errors import InputError
 from manitwin.formats.bounded_file import open_regular
-from manitwin.formats.camera_poses.posed_camera import MOST_CAMERAS, Lens, PosedCamera, checked_lens, rigid
+from manitwin.formats.camera_poses.posed_camera import MOST_CAMERAS, Lens, PosedCamera, checked_lens, orthonormalized
 from manitwin.formats.printable import printable_line
 
 CAMERAS, IMAGES = "cameras", "images"
@@ -61,7 +61,7 @@ def read_model(cameras: Path, images: Path) -> list[PosedCamera]:
         if camera not in lenses:
             raise _refused(f"{told}: its camera {camera} is not in {cameras.name}; export the model again")
         pose = np.column_stack([_rotation(quaternion, told), place])
-        posed.append(PosedCamera(name, rigid(pose, told), checked_lens(lenses[camera], told)))
+        posed.append(PosedCamera(name, orthonormalized(pose, told), checked_lens(lenses[camera], told)))
     return sorted(posed, key=lambda each: each.file)
 
 

@@ -27,10 +27,10 @@ def cameras_of(photos: Sequence[Path], cameras: Sequence[PosedCamera], called: s
     found = [_camera_of(photo, parts, by_stem, called) for photo in photos]
     for number, taken in enumerate(found):
         if taken is not None and taken in found[:number]:
-            both = f"{_told(photos[found.index(taken)])} and {_told(photos[number])}"
+            both = f"{_shown_path(photos[found.index(taken)])} and {_shown_path(photos[number])}"
             raise InputError(
                 "unreadable",
-                f"{both}: both match the same pose of {called}, {_told(Path(cameras[taken].file))}; give only one"
+                f"{both}: both match the same pose of {called}, {_shown_path(Path(cameras[taken].file))}; give only one"
                 f" of them",
             )
     return [None if number is None else cameras[number] for number in found]
@@ -43,14 +43,14 @@ def _camera_of(photo: Path, parts: Sequence[tuple[str, ...]], by_stem: dict[str,
         likely = by_stem.get(key, [])
         if not likely:
             continue
-        lengths = [_same_end(own[:-1], parts[number][:-1]) for number in likely]
+        lengths = [_common_suffix_length(own[:-1], parts[number][:-1]) for number in likely]
         best = [number for number, length in zip(likely, lengths, strict=True) if length == max(lengths)]
         if len(best) > 1:
             names = ", ".join("/".join(parts[number][-3:]) for number in best[:_SHOWN])
             shown = printable_line(names, max_characters=200)
             raise InputError(
                 "unreadable",
-                f"{_told(photo)}: matches several entries of {called}: {shown}; keep the photos in the folders that"
+                f"{_shown_path(photo)}: matches several entries of {called}: {shown}; keep the photos in the folders that"
                 f" the file names",
             )
         return best[0]
@@ -65,7 +65,7 @@ def _stem(name: str) -> str:
     return PurePosixPath(name).stem
 
 
-def _same_end(one: Sequence[str], other: Sequence[str]) -> int:
+def _common_suffix_length(one: Sequence[str], other: Sequence[str]) -> int:
     """Return the number of trailing folders in which two paths agree."""
     same = 0
     for first, second in zip(reversed(one), reversed(other), strict=False):
@@ -75,5 +75,5 @@ def _same_end(one: Sequence[str], other: Sequence[str]) -> int:
     return same
 
 
-def _told(path: Path) -> str:
+def _shown_path(path: Path) -> str:
     return printable_line("/".join(path.parts[-2:]), max_characters=120)

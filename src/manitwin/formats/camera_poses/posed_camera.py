@@ -34,7 +34,7 @@ class Lens:
     distortion: tuple[float, ...] = ()
     fisheye: bool = False
 
-    def of_picture(self, width: int, height: int) -> Lens:
+    def with_picture_size(self, width: int, height: int) -> Lens:
         """Return the lens with unset values filled in from the photo's uncropped size."""
         size = self.size_px or (float(width), float(height))
         factor = size[0] if self.in_widths else 1.0
@@ -86,7 +86,7 @@ def turned_upright(camera: PosedCamera, orientation: int) -> PosedCamera:
     return replace(camera, world_to_camera=turn @ camera.world_to_camera, lens=upright)
 
 
-def rigid(matrix: np.ndarray, told: str) -> np.ndarray:
+def orthonormalized(matrix: np.ndarray, told: str) -> np.ndarray:
     """Return a transform ``(3, 4)`` with its rotation orthonormalized.
 
     Raises InputError, with ``told`` before the cause, for invalid or too large numbers, axes that are not orthonormal, and

@@ -10,7 +10,7 @@ from manitwin.errors import InputError
 from manitwin.formats.camera_poses.colmap_model import CAMERAS, IMAGES, model_files, read_model
 from manitwin.formats.camera_poses.posed_camera import PosedCamera
 from manitwin.formats.camera_poses.transforms_json import read_transforms
-from manitwin.formats.missing_path import not_there
+from manitwin.formats.missing_path import missing_path_message
 from manitwin.formats.printable import printable_line
 
 GIVE = "give a transforms.json (NeRF, instant-ngp, nerfstudio) or the folder of a COLMAP model (cameras and images, .txt or .bin)"
@@ -30,7 +30,7 @@ def read_camera_poses(path: Path) -> CameraPoses:
     """Read a transforms.json, or a COLMAP model by its folder or one of its two files; raises InputError with one line."""
     called = printable_line(path.name or str(path), max_characters=200)
     if not path.exists():
-        raise InputError("unreadable", f"{called}: {not_there(str(path))}; {GIVE}")
+        raise InputError("unreadable", f"{called}: {missing_path_message(str(path))}; {GIVE}")
     folder = path if path.is_dir() else path.parent
     if path.is_dir() or (path.stem in (CAMERAS, IMAGES) and path.suffix in (".txt", ".bin")):
         files = model_files(folder)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from manitwin.errors import AssetError, InputError
-from manitwin.formats.camera_poses.posed_camera import MOST_CAMERAS, Lens, PosedCamera, checked_lens, rigid
+from manitwin.formats.camera_poses.posed_camera import MOST_CAMERAS, Lens, PosedCamera, checked_lens, orthonormalized
 from manitwin.formats.json_file import json_number, read_json_object
 from manitwin.formats.printable import printable_line
 
@@ -89,14 +89,14 @@ def _camera(path: Path, number: int, frame: Any, document: Mapping[str, Any]) ->
     if not isinstance(frame, dict) or not isinstance(frame.get("file_path"), str) or not frame["file_path"].strip():
         raise _refused(f"{_name(path)}: frame {number} has no file_path; name its photo there")
     told = f"{_name(path)}: frame {number} ({printable_line(frame['file_path'], max_characters=_SHOWN)})"
-    to_world = rigid(_matrix(frame.get("transform_matrix"), told), f"{told}: transform_matrix")
+    to_world = orthonormalized(_matrix(frame.get("transform_matrix"), told), f"{told}: transform_matrix")
     turn = OPENGL_TO_OPENCV @ to_world[:, :3].T
     pose = np.column_stack([turn, -turn @ to_world[:, 3]])
-    lens = _lens(_said_of_lens(document, frame), told)
+    lens = _lens(_lens_values(document, frame), told)
     return PosedCamera(frame["file_path"], pose, lens, mask=_mask(path, frame.get("mask_path"), told))
 
 
-def _said_of_lens(document: Mapping[str, Any], frame: Mapping[str, Any]) -> dict[str, Any]:
+def _lens_values(document: Mapping[str, Any], frame: Mapping[str, Any]) -> dict[str, Any]:
     """Return the lens values of a frame: its own focal length replaces all focal values of the file."""
     own = any(frame.get(key) is not None for key in _FOCAL)
     return {**{key: value for key, value in document.items() if not (own and key in _FOCAL)}, **frame}

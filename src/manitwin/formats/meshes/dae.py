@@ -55,7 +55,7 @@ def read_dae(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, s
         document = _without_broken_materials(_document(data), data, source)
         with np.errstate(all="ignore"):  # overflows are found when vertices are checked
             parts = _parts(document, source)
-        _tell_of_lost_shapes(document, parts, source)
+        _remark_lost_shapes(document, parts, source)
     except collada.common.DaeError as error:
         raise source.unreadable(f"its COLLADA is broken ({str(error)[:100]})", _REMEDY) from error
     return parts, unit_m, up
@@ -86,11 +86,11 @@ def _without_broken_materials(document: Any, data: bytes, source: MeshSource) ->
         return document
     for each in broken:
         each.getparent().remove(each)
-    source.find("materials in it are broken, and what has them is grey")
+    source.add_finding("materials in it are broken, and what has them is grey")
     return _document(etree.tostring(root))
 
 
-def _tell_of_lost_shapes(document: Any, parts: list[trimesh.Trimesh], source: MeshSource) -> None:
+def _remark_lost_shapes(document: Any, parts: list[trimesh.Trimesh], source: MeshSource) -> None:
     """Remark on shapes and nodes that pycollada skipped as broken, with the first cause; raises InputError if none are left."""
     said = [str(each).rpartition(f"{type(each).__name__}: ")[2] for each in document.errors]
     lost = sorted((each for each in said if _OF_SHAPES.match(each)), key=lambda each: each.startswith(_NOT_FOUND))
@@ -98,7 +98,7 @@ def _tell_of_lost_shapes(document: Any, parts: list[trimesh.Trimesh], source: Me
         cause = f"it has no readable faces because its COLLADA is broken ({lost[0][:100]})"
         raise source.refused("no_faces", cause, _REMEDY)
     if lost:
-        source.find(f"broken shapes or nodes in it were left out ({lost[0][:100]})")
+        source.add_finding(f"broken shapes or nodes in it were left out ({lost[0][:100]})")
 
 
 def _check_size(data: bytes, source: MeshSource) -> None:
@@ -118,7 +118,7 @@ def _inspect(data: bytes, source: MeshSource) -> tuple[float | None, str | None,
         try:
             unit_m = float(element.get("meter", "1"))
         except ValueError:
-            source.find("its <unit> is broken and was not used")
+            source.add_finding("its <unit> is broken and was not used")
     for element in root.iterfind("./{*}asset/{*}up_axis"):
         up = {"X_UP": "x", "Y_UP": "y", "Z_UP": "z"}.get((element.text or "").strip())
     if unit_m is not None and not (np.isfinite(unit_m) and unit_m > 0):
@@ -161,7 +161,7 @@ def _parts(document: Any, source: MeshSource) -> list[trimesh.Trimesh]:
         for primitive in bound.original.primitives:
             triangles = primitive.triangleset() if hasattr(primitive, "triangleset") else primitive
             if not isinstance(triangles, collada.triangleset.TriangleSet) or triangles.vertex_index is None:
-                source.find("points or lines in it were left out")
+                source.add_finding("points or lines in it were left out")
                 continue
             source.check_parts(len(parts) + 1)
             faces += len(triangles.vertex_index)
@@ -208,7 +208,7 @@ def _material(material: Any, textures: dict[str, Image.Image | None], source: Me
     if isinstance(effect.diffuse, collada.material.Map):
         path = effect.diffuse.sampler.surface.image.path or ""
         if not path:
-            source.find("a material names a texture without a file; carried on without it")
+            source.add_finding("a material names a texture without a file; carried on without it")
             textures[path] = None
         if path not in textures:
             data = source.sibling(path.removeprefix("./"), "texture")

@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 from trimesh.visual.material import PBRMaterial
 
-from manitwin.formats.fbx_names import beside, embedded_files
+from manitwin.formats.fbx_names import embedded_files, relative_name
 from manitwin.formats.fbx_unit import fbx_unit_m
 from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
 from manitwin.formats.meshes.source import MeshSource
@@ -90,7 +90,7 @@ def read_fbx(source: MeshSource) -> tuple[list[trimesh.Trimesh], float, Literal[
     except OverflowError as error:
         raise source.too_large(str(error)) from error
     if _BOUND in data:
-        source.find("it is bound to a skeleton, or has morph targets; it was taken as it was modelled")
+        source.add_finding("it is bound to a skeleton, or has morph targets; it was taken as it was modelled")
     held = embedded_files(data)
     known = [_material(each, held, source) for each in materials]
     unit_m = fbx_unit_m(data)
@@ -136,7 +136,7 @@ def scene_of(data: bytes, max_faces: int) -> tuple[list[FbxMesh], list[FbxMateri
             if mesh.num_indices == 3 * mesh.num_faces:
                 placed.append(_mesh(mesh, str(node.name), matrix))
         todo.extend((child, matrix, depth + 1) for child in reversed(node.children))
-    return placed, [_told(each) for each in scene.materials]
+    return placed, [_read_material(each) for each in scene.materials]
 
 
 def _version(data: bytes) -> int | None:
@@ -162,7 +162,7 @@ def _mesh(mesh: Any, name: str, matrix: np.ndarray) -> FbxMesh:
     )
 
 
-def _told(material: dict[str, Any]) -> FbxMaterial:
+def _read_material(material: dict[str, Any]) -> FbxMaterial:
     textures = material.get("TEXTURES") or {}
     named = {kind: str(names[0]) for kind, names in textures.items() if names}
     red, green, blue = (float(each) for each in (*material.get("COLOR_DIFFUSE", DEFAULT_COLOR), 0.0, 0.0)[:3])
@@ -194,9 +194,9 @@ def _texture(name: str | None, held: dict[str, bytes], source: MeshSource) -> An
     """Return a texture that is embedded in the file or lies beside it."""
     if not name:
         return None
-    data = held.get(beside(name).rpartition("/")[2])
-    data = source.sibling(beside(name), "texture") if data is None else data
-    return None if data is None else decode_texture(data, beside(name), source)
+    data = held.get(relative_name(name).rpartition("/")[2])
+    data = source.sibling(relative_name(name), "texture") if data is None else data
+    return None if data is None else decode_texture(data, relative_name(name), source)
 
 
 def _part(mesh: FbxMesh, materials: list[PBRMaterial], source: MeshSource) -> trimesh.Trimesh:

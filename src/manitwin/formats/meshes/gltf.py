@@ -45,7 +45,7 @@ def read_gltf(source: MeshSource, binary: bool, *, data: bytes | None = None) ->
     ``data`` is the document if it is not the content of the file. A skinned mesh is read in the pose of the file. Raises
     InputError: ``unreadable``, ``too_large``.
     """
-    with source.reading("glTF"):
+    with source.convert_errors("glTF"):
         return _scene_parts(source, binary, source.data() if data is None else data)
 
 
@@ -64,10 +64,10 @@ def _scene_parts(source: MeshSource, binary: bool, data: bytes) -> list[trimesh.
         if "mesh" not in node:
             continue
         if _INSTANCING in (node.get("extensions") or {}):
-            source.find(f"instances of a mesh in it ({_INSTANCING}) were left out: it was taken once")
+            source.add_finding(f"instances of a mesh in it ({_INSTANCING}) were left out: it was taken once")
         weights = target_weights(node.get("weights"), source)
         if "skin" in node:
-            source.find("it is bound to a skeleton; it was taken in the pose that the file holds")
+            source.add_finding("it is bound to a skeleton; it was taken in the pose that the file holds")
             joints = joint_matrices(tree, node["skin"], placed, accessors, source)
             found = reader.posed_parts(node["mesh"], joints, weights)
             matrix = np.eye(4)  # the transform of its own node does not apply
@@ -119,7 +119,7 @@ def _check_document(tree: dict[str, Any], source: MeshSource) -> None:
             f"it requires {', '.join(unknown)[:120]}", "export it without compression or extensions"
         )
     if tree.get("animations"):
-        source.find("the file is animated; its rest pose was taken")
+        source.add_finding("the file is animated; its rest pose was taken")
 
 
 def _placed_nodes(tree: dict[str, Any], source: MeshSource) -> dict[int, np.ndarray]:

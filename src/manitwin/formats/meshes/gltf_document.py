@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.formats.meshes.gltf_meshopt import MESHOPT, decompressed, is_compressed
+from manitwin.formats.meshes.gltf_meshopt import MESHOPT, decompress_view, is_compressed
 from manitwin.formats.meshes.source import Buffer, MeshSource
 
 # glTF 2.0, section 3.6.2.2
@@ -104,7 +104,7 @@ class Accessors:
             raise self._source.too_large(f"it decompresses to more than {self._source.limits.max_bytes} bytes")
         mode, filter = str(told.get("mode")), str(told.get("filter", "NONE"))
         try:
-            return decompressed(
+            return decompress_view(
                 bytes(self._range(told, "a compressed view")), mode=mode, filter=filter, count=count, stride=stride
             )
         except (ValueError, IndexError) as error:
@@ -116,12 +116,12 @@ class Accessors:
             return self._source.sibling(uri, what)
         head, _, body = uri.partition(",")
         if not head.endswith(";base64"):
-            self._source.find(f"{what} is a data URI that is not base64; carried on without it")
+            self._source.add_finding(f"{what} is a data URI that is not base64; carried on without it")
             return None
         try:
             return base64.b64decode(body, validate=True)
         except (binascii.Error, ValueError):
-            self._source.find(f"{what} is a broken data URI; carried on without it")
+            self._source.add_finding(f"{what} is a broken data URI; carried on without it")
             return None
 
     def _buffer(self, index: int) -> Buffer:
@@ -159,7 +159,7 @@ class Accessors:
         else:
             values = np.zeros((count, columns), dtype=dtype)
         if "sparse" in accessor:
-            values = self._patched(values, accessor["sparse"], columns, dtype)
+            values = self._apply_sparse(values, accessor["sparse"], columns, dtype)
         return _normalized(values, accessor)
 
     def _strided(self, view_index: Any, offset: Any, count: int, columns: int, dtype: np.dtype) -> np.ndarray:
@@ -174,7 +174,7 @@ class Accessors:
         )
         return np.ascontiguousarray(strided)
 
-    def _patched(self, values: np.ndarray, sparse: dict[str, Any], columns: int, dtype: np.dtype) -> np.ndarray:
+    def _apply_sparse(self, values: np.ndarray, sparse: dict[str, Any], columns: int, dtype: np.dtype) -> np.ndarray:
         count = self._count(sparse.get("count"))
         places, news = sparse.get("indices", {}), sparse.get("values", {})
         kind = np.dtype(_DTYPES.get(places.get("componentType", 0), np.uint32))

@@ -32,7 +32,7 @@ def decompress(primitive: dict[str, Any], accessors: Accessors, source: MeshSour
         data = bytes(accessors.view(compressed.get("bufferView")))
         source.check_faces(accessors.count(indices) // 3)
         source.check_vertices(accessors.count(attributes["POSITION"]))
-        faces, values = _decoded_elsewhere(data, source)
+        faces, values = _decode_isolated(data, source)
         source.check_faces(len(faces))
         accessors.fill(indices, faces.reshape(-1, 1))
         for name, number in ids.items():
@@ -43,7 +43,7 @@ def decompress(primitive: dict[str, Any], accessors: Accessors, source: MeshSour
     return True
 
 
-def _decoded_elsewhere(data: bytes, source: MeshSource) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+def _decode_isolated(data: bytes, source: MeshSource) -> tuple[np.ndarray, dict[int, np.ndarray]]:
     try:
         faces, values = run_isolated(f"{__name__}:decoded", data, limits=_LIMITS)
     except (ProcessCrashed, ValueError, MemoryError) as error:

@@ -42,9 +42,9 @@ class GltfMaterials:
         if texture is None and base:
             factor = list(color_of_lost_texture(factor))
         metallic = float(pbr.get("metallicFactor", 1.0))
-        if "metallicFactor" not in pbr and "metallicRoughnessTexture" not in pbr and self._forgets_metallic(entry):
+        if "metallicFactor" not in pbr and "metallicRoughnessTexture" not in pbr and self._lacks_metallic(entry):
             # trimesh writes none for materials without one (an OBJ's), which the specification interprets as metal
-            self._source.find("metallicFactor is missing in a file written by trimesh; taken as 0 (not metal)")
+            self._source.add_finding("metallicFactor is missing in a file written by trimesh; taken as 0 (not metal)")
             metallic = 0.0
         return pbr_material(
             None if entry.get("name") is None else str(entry["name"])[:_NAME_CHARACTERS],
@@ -59,7 +59,7 @@ class GltfMaterials:
             double_sided=bool(entry.get("doubleSided", False)),
         )
 
-    def _forgets_metallic(self, entry: dict[str, Any]) -> bool:
+    def _lacks_metallic(self, entry: dict[str, Any]) -> bool:
         generator = str(self._tree.get("asset", {}).get("generator", ""))
         return "pbrMetallicRoughness" in entry and "trimesh" in generator
 
@@ -68,13 +68,13 @@ class GltfMaterials:
             return None
         texture = _indexed(self._tree, "textures", info["index"])
         if texture is None:
-            self._source.find("a material names a texture that is not in the file; carried on without it")
+            self._source.add_finding("a material names a texture that is not in the file; carried on without it")
             return None
         extensions = texture.get("extensions", {})
         others = (extensions.get(name, {}).get("source") for name in ("EXT_texture_webp", "KHR_texture_basisu"))
         image = next((each for each in (texture.get("source"), *others) if each is not None), None)
         if image is None:
-            self._source.find("a texture names no picture of a kind that is read, and was left out")
+            self._source.add_finding("a texture names no picture of a kind that is read, and was left out")
             return None
         if image not in self._images:
             self._images[image] = self._image(image)
@@ -83,7 +83,7 @@ class GltfMaterials:
     def _image(self, index: Any) -> Image.Image | None:
         entry = _indexed(self._tree, "images", index)
         if entry is None:
-            self._source.find("a texture names an image that is not in the file; carried on without it")
+            self._source.add_finding("a texture names an image that is not in the file; carried on without it")
             return None
         name = str(entry.get("name") or entry.get("uri", index))[:80]
         data: Buffer | None = self._accessors.view(entry["bufferView"]) if "bufferView" in entry else None

@@ -19,7 +19,7 @@ _FOUR_BITS = tuple(bytes((each >> 4, each & 15)) for each in range(256))
 _NO_INDEX = 0xFFFFFFFF
 
 
-def decompressed(data: bytes, *, mode: str, filter: str, count: int, stride: int) -> bytes:
+def decompress_view(data: bytes, *, mode: str, filter: str, count: int, stride: int) -> bytes:
     """Return the ``count`` elements of ``stride`` bytes in a compressed buffer view.
 
     Raises ValueError or IndexError for an invalid stream.
@@ -27,7 +27,7 @@ def decompressed(data: bytes, *, mode: str, filter: str, count: int, stride: int
     if mode == "ATTRIBUTES":
         if not 0 < stride <= 256 or stride % 4:
             raise ValueError(f"attributes of {stride} bytes")
-        return _filtered(decode_attributes(data, count, stride), filter).tobytes()
+        return _apply_filter(decode_attributes(data, count, stride), filter).tobytes()
     if mode not in ("TRIANGLES", "INDICES") or stride not in (2, 4) or filter != "NONE":
         raise ValueError(f"mode {mode[:20]!r}, filter {filter[:20]!r}, {stride} bytes")
     indices = decode_triangles(data, count) if mode == "TRIANGLES" else decode_indices(data, count)
@@ -106,7 +106,7 @@ def decode_triangles(data: bytes, count: int) -> np.ndarray:
             elif low < 13:
                 c = vertices[(vertex - 1 - low) & 15]
             else:
-                c = stream.beside(low == 14) if low < 15 else stream.index()
+                c = stream.adjacent(low == 14) if low < 15 else stream.index()
             is_new = low == 0 or low >= 13
             added = [(c, b), (a, c)]
             fresh = [c] if is_new else []
@@ -152,7 +152,7 @@ def decode_indices(data: bytes, count: int) -> np.ndarray:
     last, made = [0, 0], []
     for _ in range(count):
         value = stream.number()
-        last[value & 1] = (last[value & 1] + _unfolded(value >> 1)) & _NO_INDEX
+        last[value & 1] = (last[value & 1] + _decode_zigzag(value >> 1)) & _NO_INDEX
         made.append(last[value & 1])
     return np.array(made, np.int64).astype(np.uint32)
 
@@ -182,21 +182,21 @@ class _Indices:
 
     def index(self) -> int:
         """Return the next index, coded as difference to the last one of this reader."""
-        self._last = (self._last + _unfolded(self.number())) & _NO_INDEX
+        self._last = (self._last + _decode_zigzag(self.number())) & _NO_INDEX
         return self._last
 
-    def beside(self, is_next: bool) -> int:
+    def adjacent(self, is_next: bool) -> int:
         """Return the successor or predecessor of the last index of this reader."""
         self._last = (self._last + (1 if is_next else -1)) & _NO_INDEX
         return self._last
 
 
-def _unfolded(value: int) -> int:
+def _decode_zigzag(value: int) -> int:
     """Decode a zigzag integer to a signed one."""
     return value >> 1 if value & 1 == 0 else ~(value >> 1)
 
 
-def _filtered(elements: np.ndarray, name: str) -> np.ndarray:
+def _apply_filter(elements: np.ndarray, name: str) -> np.ndarray:
     """Apply a filter to elements (count, stride) uint8 (appendix B)."""
     stride = elements.shape[1]
     if name == "NONE":

@@ -24,7 +24,7 @@ def target_weights(given: Any, source: MeshSource) -> tuple[float, ...]:
     return tuple(float(each) for each in given)
 
 
-def morphed(
+def apply_morph_targets(
     rows: np.ndarray,
     targets: Any,
     weights: Sequence[float],

@@ -11,8 +11,8 @@ from trimesh.visual import TextureVisuals
 from manitwin.formats.meshes.gltf_document import Accessors
 from manitwin.formats.meshes.gltf_draco import decompress
 from manitwin.formats.meshes.gltf_materials import GltfMaterials, texture_coordinates, transformed_uv
-from manitwin.formats.meshes.gltf_morph import morphed, target_weights
-from manitwin.formats.meshes.gltf_skin import influences, posed
+from manitwin.formats.meshes.gltf_morph import apply_morph_targets, target_weights
+from manitwin.formats.meshes.gltf_skin import apply_skin, influences
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import (
     color_by_corner,
@@ -58,12 +58,12 @@ class GltfPrimitives:
     ) -> trimesh.Trimesh | None:
         mode = primitive.get("mode", 4)
         if mode not in (4, 5, 6):
-            self._source.find("points or lines in it were left out")
+            self._source.add_finding("points or lines in it were left out")
             return None
         targets = primitive.get("targets")
         if targets:
             how = "they were taken as the file weighs them" if any(weights) else "its base shape was taken"
-            self._source.find(f"it has morph targets; {how}")
+            self._source.add_finding(f"it has morph targets; {how}")
         attributes = primitive.get("attributes", {})
         if decompress(primitive, self._accessors, self._source):
             mode = 4
@@ -72,7 +72,7 @@ class GltfPrimitives:
             raise self._source.unreadable("a mesh has no positions", "export it again")
         count = len(vertices)
         if targets and any(weights):
-            vertices = morphed(vertices, targets, weights, self._accessors, self._source)
+            vertices = apply_morph_targets(vertices, targets, weights, self._accessors, self._source)
         faces = self._faces(primitive, count, mode)
         used: np.ndarray | slice = slice(None)
         if self._vertex_count + count > self._source.limits.max_vertices:
@@ -93,12 +93,12 @@ class GltfPrimitives:
             uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])  # to the origin at the lower left
         normals = self._rows(attributes, "NORMAL", 3, count)
         if normals is not None and targets and any(weights):
-            normals = morphed(normals, targets, weights, self._accessors, self._source, "NORMAL")
+            normals = apply_morph_targets(normals, targets, weights, self._accessors, self._source, "NORMAL")
             normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
         normals = None if normals is None else normals[used]
         if joints is not None:
             bound, shares = influences(attributes, self._accessors, count, self._source)
-            vertices, normals = posed(vertices, normals, (bound[used], shares[used]), joints, self._source)
+            vertices, normals = apply_skin(vertices, normals, (bound[used], shares[used]), joints, self._source)
         part = make_part(vertices, faces, material=material, name=name, uv=uv, normals=normals)
         colors = self._rows(attributes, "COLOR_0", 3, count)
         if colors is None:
@@ -115,7 +115,7 @@ class GltfPrimitives:
         if not len(colors) or (colors > _WHITE).all():
             return part
         if np.ptp(colors, axis=0).max() > 1 - _WHITE:
-            self._source.find("colours of its vertices, which tint a texture, were left out")
+            self._source.add_finding("colours of its vertices, which tint a texture, were left out")
             return part
         material = material_of(part).copy()
         factor = np.asarray(material.baseColorFactor, float) * np.append(colors.mean(axis=0), 1.0)

@@ -63,7 +63,7 @@ def influences(
     return np.hstack(joints), shares / total
 
 
-def posed(
+def apply_skin(
     vertices: np.ndarray,
     normals: np.ndarray | None,
     bound_to: tuple[np.ndarray, np.ndarray],

@@ -14,6 +14,7 @@ from trimesh.visual.material import PBRMaterial
 
 from manitwin.formats.meshes.obj_faces import Faces
 from manitwin.formats.meshes.point_hull import hull_part
+from manitwin.formats.meshes.shading_normals import triangle_fans
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import (
     DEFAULT_COLOR,
@@ -24,7 +25,6 @@ from manitwin.formats.meshes.textures import (
     material_of,
     pbr_material,
 )
-from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.source_files import map_file_name
 
 _MAX_PLAIN_BYTES = 64 << 20  # limit for a text that is split into lines at once; longer ones are read line by line
@@ -152,7 +152,7 @@ def _unique_corners(
     for column, (count, what) in enumerate(zip(counts, ("vertex", "texture coordinate", "normal"), strict=True)):
         if column and not count and rows[:, column].max() >= 0:
             rows[:, column] = -1  # optional indices are ignored, as in other loaders
-            source.find(f"its faces name {what}s, of which it has none")
+            source.add_finding(f"its faces name {what}s, of which it has none")
         if rows[:, column].max() >= count:
             raise source.unreadable(
                 f"a face names {what} {rows[:, column].max() + 1} of {count}",
@@ -205,7 +205,7 @@ def _materials(document: _Document, source: MeshSource) -> dict[str, PBRMaterial
             materials = read_mtl(data.decode("utf-8", errors="replace"), source) | materials
     missing = [name for name in document.groups if name and name not in materials]
     if materials and missing:
-        source.find(f"material {missing[0]!r} is in no material library; shown grey")
+        source.add_finding(f"material {missing[0]!r} is in no material library; shown grey")
     return materials
 
 

@@ -32,7 +32,7 @@ class Faces:
         Raises InputError ``unreadable`` naming a line that is not a face; ``rows`` may raise it too, for a line added earlier.
         """
         if "-" in said:  # relative to the current counts
-            self._read_waiting()
+            self._parse_pending()
             self._read_one(number, line, said, counts)
         else:
             self._waiting.append((number, line, said))
@@ -40,14 +40,14 @@ class Faces:
 
     def rows(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the corner counts ``(P,)`` of polygons and the corners ``(sum, 3)``; both empty if no face has three corners."""
-        self._read_waiting()
+        self._parse_pending()
         self._end_block()
         if not self._blocks:
             return np.zeros(0, np.int64), np.zeros((0, 3), np.int64)
         sizes, corners = zip(*self._blocks, strict=True)
         return np.concatenate(sizes), np.concatenate(corners)
 
-    def _read_waiting(self) -> None:
+    def _parse_pending(self) -> None:
         if not self._waiting:
             return
         sizes = np.array(self._waiting_sizes)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
+from manitwin.formats.meshes.shading_normals import triangle_fans
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import DEFAULT_COLOR, color_by_corner, make_part, pbr_material
-from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.sniff import OFF_KEYWORD
 
 _REMEDY = "export it again, or as OBJ"
@@ -87,12 +87,12 @@ def _polygons(
         raise source.unreadable("a face refers to a vertex that does not exist", _REMEDY)
     said = [words[1 + size :] for words, size in zip(lines, sizes, strict=True)]
     if any(len(words) not in _COLORS for words in said):
-        source.find("numbers behind its faces that are no colours were left out")
+        source.add_finding("numbers behind its faces that are no colours were left out")
         return sizes, corners, None
     if all(len(words) >= 3 for words in said):
         return sizes, corners, np.array([words[:3] for words in said], np.float64)
     if any(said):
-        source.find("colours of some faces, or by a map, were left out")
+        source.add_finding("colours of some faces, or by a map, were left out")
     return sizes, corners, None
 
 

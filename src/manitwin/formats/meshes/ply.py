@@ -19,9 +19,9 @@ from manitwin.formats.meshes.ply_rows import (
     binary_rows,
     check_rows,
 )
+from manitwin.formats.meshes.shading_normals import triangle_fans
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import DEFAULT_COLOR, color_by_corner, decode_texture, make_part, pbr_material
-from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.source_files import ply_texture
 
 _MAX_DIGITS = 18  # more rows than any disk holds

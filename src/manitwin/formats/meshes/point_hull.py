@@ -33,5 +33,5 @@ def hull_part(points: np.ndarray, source: MeshSource, color: tuple[float, float,
         hull = trimesh.convex.convex_hull(points)
     except QhullError as error:
         raise flat from error
-    source.find(f"it holds {len(points)} points and no faces: their convex hull was read")
+    source.add_finding(f"it holds {len(points)} points and no faces: their convex hull was read")
     return make_part(hull.vertices, hull.faces, material=pbr_material(None, base_color=color), name="mesh")

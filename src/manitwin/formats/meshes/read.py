@@ -16,11 +16,11 @@ from manitwin.formats.meshes.msh import read_msh
 from manitwin.formats.meshes.obj import read_obj
 from manitwin.formats.meshes.off import read_off
 from manitwin.formats.meshes.ply import read_ply
+from manitwin.formats.meshes.shading_normals import has_constant_normal, with_normals, without_normals
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
 from manitwin.formats.meshes.step import read_step
 from manitwin.formats.meshes.stl import read_stl
 from manitwin.formats.meshes.three_mf import read_three_mf
-from manitwin.formats.meshes.triangles import has_one_false_normal, shaded, without_normals
 from manitwin.formats.sniff import sniff
 
 _SUFFIXES = {
@@ -81,14 +81,14 @@ def read_mesh(
     if sniffed.kind != "mesh":
         raise source.refused("wrong_type", f"contains an image ({sniffed.format}), not a mesh", "pass it as an image")
     if path.suffix.lower() not in _SUFFIXES[sniffed.format]:
-        source.find(
+        source.add_finding(
             f"the file is named {path.suffix or 'without a suffix'} and holds {sniffed.format}; it was read as that"
         )
-    with source.reading(sniffed.format):
+    with source.convert_errors(sniffed.format):
         parts, unit_m, up = _read(sniffed.format, source)
         parts = _checked(parts, source)
     if unit_m is not None and not _MIN_UNIT_M <= unit_m <= _MAX_UNIT_M:
-        source.find(f"its unit of {unit_m} m was not used")
+        source.add_finding(f"its unit of {unit_m} m was not used")
         unit_m = None
     return MeshFile(parts, sniffed.format, unit_m, up, source.findings, source.files())
 
@@ -149,7 +149,9 @@ def _checked(parts: list[trimesh.Trimesh], source: MeshSource) -> list[trimesh.T
 
 def _shaded(parts: list[trimesh.Trimesh], source: MeshSource) -> list[trimesh.Trimesh]:
     for index, part in enumerate(parts):
-        if has_one_false_normal(part):
-            source.find("normals in it are one vector for faces that look other ways; they are computed from the faces")
+        if has_constant_normal(part):
+            source.add_finding(
+                "normals in it are one vector for faces that look other ways; they are computed from the faces"
+            )
             parts[index] = without_normals(part)
-    return [shaded(part) for part in parts] if source.limits.shading else parts
+    return [with_normals(part) for part in parts] if source.limits.shading else parts

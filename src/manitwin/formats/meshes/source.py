@@ -106,7 +106,7 @@ class MeshSource:
         """
         outside = False
         for spelling in spellings(name):
-            named = list(self._places(spelling))
+            named = list(self._candidates(spelling))
             outside = outside or all(place is None for place in named)
             places = [(self.root or self.path.parent, place) for place in named]
             places += [(folder, inside_folder(folder, spelling.rpartition("/")[2])) for folder in self.texture_folders]
@@ -115,12 +115,12 @@ class MeshSource:
                     return self._read(found, inside)
         if outside:
             own = "the file's own folder" if self.root is None else f"the folder {self.root.resolve().name!r}"
-            self.find(f"{what} {_short(name)} lies outside {own} and was not read")
+            self.add_finding(f"{what} {_short(name)} lies outside {own} and was not read")
         else:
-            self.find(f"{what} {_short(name)} is not there; carried on without it")
+            self.add_finding(f"{what} {_short(name)} is not there; carried on without it")
         return None
 
-    def _places(self, name: str) -> Iterator[Path | None]:
+    def _candidates(self, name: str) -> Iterator[Path | None]:
         """Yield candidate paths of a file that the mesh names; None for a path outside the root.
 
         A name of a package or model (``model://NAME/...``, as in Gazebo's materials) is resolved in the folder of that name.
@@ -139,7 +139,7 @@ class MeshSource:
         """Return the other files that were read, sorted."""
         return tuple(sorted(self._contents))
 
-    def find(self, sentence: str) -> None:
+    def add_finding(self, sentence: str) -> None:
         """Add a finding, unless it was added before."""
         line = printable_line(sentence, max_characters=_MESSAGE_CHARACTERS)
         if line not in self.findings and len(self.findings) < _MAX_FINDINGS:
@@ -183,7 +183,7 @@ class MeshSource:
             raise self.too_large(f"it has more than {MAX_PARTS} parts", "merge them before exporting")
 
     @contextmanager
-    def reading(self, format: str) -> Iterator[None]:
+    def convert_errors(self, format: str) -> Iterator[None]:
         """Convert any failure of a reader on a broken or too large file to InputError."""
         try:
             yield

@@ -16,7 +16,7 @@ from trimesh.visual.material import PBRMaterial
 from manitwin.errors import InputError
 from manitwin.formats.meshes.ktx2 import KTX2, register_ktx2
 from manitwin.formats.meshes.source import Buffer, MeshSource
-from manitwin.formats.sniff import told_of_no_file_itself
+from manitwin.formats.sniff import placeholder_description
 
 # formats used by real asset packs; untrusted files never reach Pillow's other decoders
 TEXTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF", KTX2)
@@ -49,7 +49,7 @@ def _decoded(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             image: Image.Image = Image.open(io.BytesIO(data), formats=TEXTURE_FORMATS)
             if image.width * image.height > source.limits.max_texture_pixels:
-                source.find(
+                source.add_finding(
                     f"texture {name!r} of {image.width} x {image.height} pixels is over the limit and was left out"
                 )
                 return None
@@ -60,11 +60,13 @@ def _decoded(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
     except (InputError, MemoryError):
         raise
     except UnidentifiedImageError:  # its message contains a memory address
-        told = told_of_no_file_itself(bytes(memoryview(data)[:_HEAD_BYTES]))
-        source.find(f"texture {name!r} {told or 'is no picture that is read, and was left out'}")
+        told = placeholder_description(bytes(memoryview(data)[:_HEAD_BYTES]))
+        source.add_finding(f"texture {name!r} {told or 'is no picture that is read, and was left out'}")
         return None
     except Exception as error:  # a decoder may raise anything on damaged bytes
-        source.find(f"texture {name!r} cannot be decoded and was left out ({' '.join(str(error).split())[:100]})")
+        source.add_finding(
+            f"texture {name!r} cannot be decoded and was left out ({' '.join(str(error).split())[:100]})"
+        )
         return None
     if image.mode in ("I", "I;16", "I;16B", "I;16L"):
         # 16-bit grey: Pillow's own conversion clips
@@ -229,7 +231,7 @@ def color_by_corner(
     material = material_of(part).copy()
     if cell is None or count == 0:
         if count and source is not None:
-            source.find(
+            source.add_finding(
                 f"the colours of {count} vertices and faces were replaced by their mean: too many for a texture"
             )
         mean = corner_colors.reshape(-1, 3).mean(0) if count else np.full(3, 255)

@@ -77,9 +77,9 @@ class _Reader:
         if not items:
             held = {each.object_id for some in model.objects.values() for each in some.components}
             items = [Component(number, None, np.eye(4)) for number in model.objects if number not in held]
-            self._source.find("it says nothing of what is to be built; all of its objects were taken")
+            self._source.add_finding("it says nothing of what is to be built; all of its objects were taken")
         if len(items) > 1:
-            self._source.find(f"its plate has {len(items)} objects, which were taken together as they lie")
+            self._source.add_finding(f"its plate has {len(items)} objects, which were taken together as they lie")
         for item in items:
             yield from self._placed(item, item.object_id, model, np.eye(4), 0)
 
@@ -96,9 +96,9 @@ class _Reader:
         if found is None:
             raise self._source.unreadable(f"object {component.object_id} is not there", "export it again")
         if found.kind not in _MATTER:
-            self._source.find(f"objects of type {found.kind[:20]!r} in it help to print it, and were left out")
+            self._source.add_finding(f"objects of type {found.kind[:20]!r} in it help to print it, and were left out")
             return
-        if self._notes.helps(owner, component.object_id, self._source):
+        if self._notes.is_print_aid(owner, component.object_id, self._source):
             return
         matrix = parent @ component.matrix
         key = id(found), owner
@@ -112,7 +112,7 @@ class _Reader:
     def _own_parts(self, found: ModelObject, owner: int, number: int, model: Model) -> Iterator[trimesh.Trimesh]:
         """Yield the parts of an object's own triangles, one for each texture and each colour."""
         count = len(found.triangles)
-        is_matter = self._notes.matter(number, count, self._source)
+        is_matter = self._notes.is_product(number, count, self._source)
         textured = is_matter & _has_texture(found, model, self._source)
         for group in np.unique(found.groups[textured]):
             some = np.flatnonzero(textured & (found.groups == group))
@@ -155,12 +155,12 @@ def _colors(
         table = model.colors.get(int(group))
         if table is None:
             if group != NONE and int(group) not in model.texture_coordinates:
-                source.find("properties in it are of no kind that is read; what has them is grey")
+                source.add_finding("properties in it are of no kind that is read; what has them is grey")
             continue
         corners = found.corners[triangles[some]]
         is_there = ((corners >= 0) & (corners < len(table))).all(axis=1)
         if not is_there.all():
-            source.find("colours that triangles in it name are not there; what has them is grey")
+            source.add_finding("colours that triangles in it name are not there; what has them is grey")
         some = np.flatnonzero(some)[is_there]
         colors[some] = table[corners[is_there]]
         if model.names[int(group)]:
@@ -181,7 +181,7 @@ def _has_texture(found: ModelObject, model: Model, source: MeshSource) -> np.nda
         some = found.groups == group
         is_there = ((found.corners >= 0) & (found.corners < len(places))).all(axis=1)
         if (some & ~is_there).any():
-            source.find("texture coordinates that triangles in it name are not there; what has them is grey")
+            source.add_finding("texture coordinates that triangles in it name are not there; what has them is grey")
         textured |= some & is_there
     return textured
 

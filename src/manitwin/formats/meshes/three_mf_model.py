@@ -103,7 +103,7 @@ class _Walker:
             "item": self._item, "basematerials": self._colors, "base": self._base, "colorgroup": self._colors,
             "color": self._color, "texture2d": self._texture, "texture2dgroup": self._coordinates,
             "tex2coord": self._coordinate, "compositematerials": self._mixtures, "composite": self._mixture,
-            "multiproperties": self._several, "multi": self._one_of_several,
+            "multiproperties": self._multiproperties, "multi": self._multi,
         }  # fmt: skip
         self._group = NONE
         self._rows: list[tuple[int, ...]] = []
@@ -117,7 +117,7 @@ class _Walker:
             self._check_required(attributes.get("requiredextensions", ""), namespaces)
             self.model.unit = attributes.get("unit", "millimeter")
         elif tag == "beamlattice":
-            self._source.find("its lattice of beams is no mesh, and was left out")
+            self._source.add_finding("its lattice of beams is no mesh, and was left out")
         elif (element := self._elements.get(tag)) is not None:
             element(attributes)
 
@@ -225,7 +225,7 @@ class _Walker:
     def _coordinate(self, attributes: Mapping[str, str]) -> None:
         self._places.extend((float(attributes["u"]), float(attributes["v"])))
 
-    def _several(self, attributes: Mapping[str, str]) -> None:
+    def _multiproperties(self, attributes: Mapping[str, str]) -> None:
         """Select the last known layer of layered properties, which is on top of the others."""
         self._group = int(attributes["id"])
         layers = [int(each) for each in attributes["pids"].split()]
@@ -235,7 +235,7 @@ class _Walker:
         self._layer = known[-1] if known else 0
         self._aliases[self._group] = layers[self._layer], []
 
-    def _one_of_several(self, attributes: Mapping[str, str]) -> None:
+    def _multi(self, attributes: Mapping[str, str]) -> None:
         places = [int(each) for each in attributes["pindices"].split()]
         self._aliases[self._group][1].append(places[self._layer] if self._layer < len(places) else 0)
 

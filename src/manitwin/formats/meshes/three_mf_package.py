@@ -80,7 +80,7 @@ class ThreeMfPackage:
     def texture(self, name: str) -> bytes | None:
         """Return the content of a picture, or None with a finding if it is missing."""
         if _part_name(name) not in self._members:
-            self._source.find(f"texture {name[:80]!r} is not in the archive; carried on without it")
+            self._source.add_finding(f"texture {name[:80]!r} is not in the archive; carried on without it")
             return None
         return b"".join(self.blocks(name))
 

@@ -30,7 +30,7 @@ _MOST_FILAMENTS = 256
 
 
 @dataclass(frozen=True)
-class Range:
+class TriangleRange:
     """Triangles ``first`` to ``last`` of an object's mesh: a piece of some ``kind``, printed by an ``extruder`` (from 1)."""
 
     first: int
@@ -43,24 +43,24 @@ class Range:
 class SlicerNotes:
     """The notes of one archive; ids are those of objects and their components. Empty for other archives."""
 
-    ranges: dict[int, list[Range]] = field(default_factory=dict)
+    ranges: dict[int, list[TriangleRange]] = field(default_factory=dict)
     kinds: dict[tuple[int, int], str] = field(default_factory=dict)
     extruders: dict[tuple[int, int], int] = field(default_factory=dict)
     objects: dict[int, int] = field(default_factory=dict)
     filaments: list[Color | None] = field(default_factory=list)
 
-    def helps(self, object_id: int, part_id: int, source: MeshSource) -> bool:
+    def is_print_aid(self, object_id: int, part_id: int, source: MeshSource) -> bool:
         """Return whether a component of an object only helps printing; if so, add a finding."""
         kind = self.kinds.get((object_id, part_id), "normal_part")
-        _find_left_out(kind, source)
+        _add_left_out_finding(kind, source)
         return kind not in _MATTER
 
-    def matter(self, part_id: int, count: int, source: MeshSource) -> np.ndarray:
+    def is_product(self, part_id: int, count: int, source: MeshSource) -> np.ndarray:
         """Return which (F,) of an object's ``count`` triangles belong to the product, with a finding on the others."""
         is_matter = np.ones(count, bool)
         for each in self.ranges.get(part_id, []):
             if each.kind not in _MATTER:
-                _find_left_out(each.kind, source)
+                _add_left_out_finding(each.kind, source)
                 is_matter[each.first : each.last + 1] = False
         return is_matter
 
@@ -104,7 +104,7 @@ def _read_object(element: etree._Element, notes: SlicerNotes) -> None:
         extruder = _metadata(volume, "extruder")
         is_modifier = _metadata(volume, "modifier") == "1"  # before PrusaSlicer 1.42
         kind = _metadata(volume, "volume_type") or ("ParameterModifier" if is_modifier else "ModelPart")
-        piece = Range(
+        piece = TriangleRange(
             max(int(volume.get("firstid", "0")), 0),
             max(int(volume.get("lastid", "-1")), -1),
             kind,
@@ -152,10 +152,10 @@ def _color(text: str) -> Color | None:
         return None
 
 
-def _find_left_out(kind: str, source: MeshSource) -> None:
+def _add_left_out_finding(kind: str, source: MeshSource) -> None:
     if kind in _CUT_OUT:
-        source.find(
+        source.add_finding(
             "pieces in it that a slicer cuts out of the thing were left out, and so were the holes that they make"
         )
     elif kind not in _MATTER:
-        source.find("pieces in it that only tell a slicer how to print were left out")
+        source.add_finding("pieces in it that only tell a slicer how to print were left out")

@@ -25,7 +25,7 @@ def cause_of(error: Tf.ErrorException) -> str:
     return printable_line(line, max_characters=_CHARACTERS)
 
 
-def broken(error: Tf.ErrorException) -> str:
+def broken_usd_cause(error: Tf.ErrorException) -> str:
     """Return the cause for an error message about broken USD."""
     cause = cause_of(error)
     return f"its USD is broken ({cause})" if cause else "its USD is broken"

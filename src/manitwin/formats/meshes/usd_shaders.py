@@ -90,7 +90,7 @@ def tint_of(reader: UsdShade.Shader | None) -> tuple[float, ...]:
     return (1.0, 1.0, 1.0) if reader is None else numbers_of(value_of(reader.GetInput("scale")), (1.0, 1.0, 1.0))
 
 
-def placing(reader: UsdShade.Shader | None) -> tuple[str | None, np.ndarray | None]:
+def texture_placement(reader: UsdShade.Shader | None) -> tuple[str | None, np.ndarray | None]:
     """Return the primvar of a texture's coordinates, and the transform ``(3, 3)`` on them; None for the defaults.
 
     UsdTransform2d scales, rotates counter-clockwise in degrees, and translates. Source: the UsdPreviewSurface specification.

@@ -26,20 +26,20 @@ class Skeletons:
             if prim.IsA(UsdSkel.Root):
                 self._cache.Populate(UsdSkel.Root(prim), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
 
-    def posed(self, prim: Usd.Prim, points: np.ndarray) -> np.ndarray:
+    def pose_points(self, prim: Usd.Prim, points: np.ndarray) -> np.ndarray:
         """Return a bound mesh's points ``(V, 3)`` posed by its skeleton, in the mesh's own frame.
 
         The pose is that of the first frame of its animation, or else the rest pose. Raises InputError ``unreadable``.
         """
         try:
-            moved = self._moved(prim, points)
+            moved = self._skinned_points(prim, points)
         except (Tf.ErrorException, ValueError, TypeError) as error:
             raise self._broken(prim) from error
         if moved is None or moved.shape != points.shape:
             raise self._broken(prim)
         return moved
 
-    def _moved(self, prim: Usd.Prim, points: np.ndarray) -> np.ndarray | None:
+    def _skinned_points(self, prim: Usd.Prim, points: np.ndarray) -> np.ndarray | None:
         time = Usd.TimeCode.EarliestTime()
         skeleton = UsdSkel.BindingAPI(prim).GetInheritedSkeleton()
         pose, skin = self._cache.GetSkelQuery(skeleton), self._cache.GetSkinningQuery(prim)

@@ -27,9 +27,9 @@ from manitwin.formats.meshes.usd_shaders import (
     first_number,
     kind_of,
     numbers_of,
-    placing,
     same_picture,
     shaders_of,
+    texture_placement,
     tint_of,
     upstream,
     value_of,
@@ -65,7 +65,7 @@ class PreviewSurfaces:
         """Convert linear colours to sRGB, clipped to 0..1."""
         return linear_to_srgb(np.clip(linear, 0, 1))
 
-    def of(self, prim: Usd.Prim) -> UsdSurface:
+    def bound_surface(self, prim: Usd.Prim) -> UsdSurface:
         """Return the surface bound to a prim."""
         material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
         key = str(material.GetPath()) if material else ""
@@ -85,7 +85,9 @@ class PreviewSurfaces:
             if colors or kind_of(shader).startswith(_OMNI_PBR) or asset_of(shader.GetInput(_OMNI_TEXTURE)):
                 return self._other(name, shader, colors[0] if colors else None)
         kinds = ", ".join(kind for shader in shaders if (kind := kind_of(shader)))
-        self._source.find(f"material {name!r} is no UsdPreviewSurface{f' ({kinds})' if kinds else ''}; shown grey")
+        self._source.add_finding(
+            f"material {name!r} is no UsdPreviewSurface{f' ({kinds})' if kinds else ''}; shown grey"
+        )
         return UsdSurface(pbr_material(name, base_color=DEFAULT_COLOR))
 
     def _preview(self, name: str, shader: UsdShade.Shader) -> UsdSurface:
@@ -114,7 +116,7 @@ class PreviewSurfaces:
                 alpha_mode=see_through,
                 alpha_cutoff=threshold if see_through == "MASK" else None,
             ),
-            *(placing(reader) if texture is not None else (None, None)),
+            *(texture_placement(reader) if texture is not None else (None, None)),
         )
 
     def _other(self, name: str, shader: UsdShade.Shader, socket: UsdShade.Input | None) -> UsdSurface:
@@ -132,7 +134,7 @@ class PreviewSurfaces:
         scale = numbers_of(value_of(shader.GetInput("texture_scale")), (1.0, 1.0))
         shift = numbers_of(value_of(shader.GetInput("texture_translate")), (0.0, 0.0))
         if first_number(shader, 0.0, "texture_rotate"):
-            self._source.find(f"material {name!r} turns its texture, which was not followed")
+            self._source.add_finding(f"material {name!r} turns its texture, which was not followed")
         change = np.array([[scale[0], 0, shift[0]], [0, scale[1], shift[1]], [0, 0, 1.0]])
         normals = asset_of(shader.GetInput("normalmap_texture"))
         clear = value_of(shader.GetInput("enable_opacity"))
@@ -158,7 +160,7 @@ class PreviewSurfaces:
         named = next((found for shader in upstream(attributes) if (found := asset_of(shader.GetInput("file")))), None)
         texture = None if named is None else self._picture(*named)
         if texture is None:
-            self._source.find(
+            self._source.add_finding(
                 f"the colour of material {socket.GetPrim().GetParent().GetName()!r} is not read; shown grey"
             )
         return (DEFAULT_COLOR if texture is None else (1.0, 1.0, 1.0)), texture

@@ -7,15 +7,15 @@ from pxr import Usd, UsdGeom, UsdPhysics
 
 def metres_per_unit(stage: Usd.Stage) -> float | None:
     """Return the stage's length unit in metres, None if not stated (USD's default is 0.01)."""
-    return _said(stage, str(UsdGeom.Tokens.metersPerUnit))
+    return _stage_number(stage, str(UsdGeom.Tokens.metersPerUnit))
 
 
 def kilograms_per_unit(stage: Usd.Stage) -> float | None:
     """Return the stage's mass unit in kilograms, None if not stated (USD's default is 1)."""
-    return _said(stage, str(UsdPhysics.Tokens.kilogramsPerUnit))
+    return _stage_number(stage, str(UsdPhysics.Tokens.kilogramsPerUnit))
 
 
-def _said(stage: Usd.Stage, key: str) -> float | None:
+def _stage_number(stage: Usd.Stage, key: str) -> float | None:
     """Return a number of the stage's metadata, from the session layer or else the root layer.
 
     It is read from the layers, which may store any numeric type: ``UsdGeom.GetStageMetersPerUnit`` and similar functions raise

@@ -9,11 +9,11 @@ import numpy as np
 import trimesh
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
+from manitwin.formats.meshes.shading_normals import triangle_fans
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import bake_transform, color_by_corner, make_part
-from manitwin.formats.meshes.triangles import triangle_fans
-from manitwin.formats.meshes.usd_errors import broken
-from manitwin.formats.meshes.usd_places import placed_prims
+from manitwin.formats.meshes.usd_errors import broken_usd_cause
+from manitwin.formats.meshes.usd_placed_prims import placed_prims
 from manitwin.formats.meshes.usd_skin import Skeletons, is_bound
 from manitwin.formats.meshes.usd_surfaces import PreviewSurfaces, UsdSurface
 from manitwin.formats.meshes.usd_units import metres_per_unit
@@ -37,7 +37,7 @@ def read_usdz(
     try:
         parts, unit_m, up = _read(Usd.Stage.Open(str(source.path)), archive, source)
     except Tf.ErrorException as error:
-        raise source.unreadable(broken(error), "export it again") from error
+        raise source.unreadable(broken_usd_cause(error), "export it again") from error
     return parts, unit_m, up, source.findings, source.bytes_read
 
 
@@ -46,7 +46,7 @@ def _read(
 ) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
     unit_m = metres_per_unit(stage)
     if unit_m is not None and not (np.isfinite(unit_m) and unit_m > 0):
-        source.find(f"its metersPerUnit is {unit_m} and was not used")
+        source.add_finding(f"its metersPerUnit is {unit_m} and was not used")
         unit_m = None
     up = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
     return _parts(stage, archive, source), unit_m, up
@@ -62,10 +62,10 @@ def _parts(stage: Usd.Stage, archive: UsdzArchive, source: MeshSource) -> list[t
         if not prim.IsA(UsdGeom.Mesh):
             drawn_for_people = UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide  # such as grasp lines
             if not drawn_for_people and prim.IsA(UsdGeom.Gprim):
-                source.find(f"{prim.GetTypeName()} prims in it were left out: only meshes are read")
+                source.add_finding(f"{prim.GetTypeName()} prims in it were left out: only meshes are read")
             continue
         if placed.is_hidden() or UsdGeom.Imageable(prim).ComputePurpose() in ("guide", "proxy"):
-            source.find("hidden, guide or proxy meshes in it were left out")
+            source.add_finding("hidden, guide or proxy meshes in it were left out")
             continue
         if prim.GetPath() not in made:  # instanced meshes are converted once
             made[prim.GetPath()] = mesh_parts(UsdGeom.Mesh(prim), surfaces, skeletons, source)
@@ -86,16 +86,16 @@ def mesh_parts(
         return []
     points, sizes, indices = polygons
     if _is_subdivided(mesh):
-        source.find(
+        source.add_finding(
             "subdivision surfaces in it were read as the meshes that control them: larger than they are, with corners where"
             " they are round, the more so the coarser the mesh"
         )
     if is_bound(mesh.GetPrim()):
-        source.find("it is bound to a skeleton; it was taken in the first pose that the file holds")
-        points = skeletons.posed(mesh.GetPrim(), points)
+        source.add_finding("it is bound to a skeleton; it was taken in the first pose that the file holds")
+        points = skeletons.pose_points(mesh.GetPrim(), points)
     for attribute in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr()):
         if attribute.ValueMightBeTimeVarying():
-            source.find("the file is animated; its first frame was taken")
+            source.add_finding("the file is animated; its first frame was taken")
     source.check_faces(int(np.maximum(sizes - 2, 0).sum()))
     corners, owner = triangle_fans(sizes)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
@@ -158,8 +158,8 @@ def _subsets(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, count: int) -> Itera
         chosen[members[(members >= 0) & (members < count)]] = True
         chosen &= rest
         rest &= ~chosen
-        yield surfaces.of(subset.GetPrim()), chosen
-    yield surfaces.of(mesh.GetPrim()), rest
+        yield surfaces.bound_surface(subset.GetPrim()), chosen
+    yield surfaces.bound_surface(mesh.GetPrim()), rest
 
 
 def _uv(mesh: UsdGeom.Mesh, wanted: str | None, indices: np.ndarray, points: int) -> np.ndarray | None:

@@ -62,15 +62,15 @@ class UsdzArchive:
         """Return a member's bytes, or None with a finding; nothing outside the archive is ever opened."""
         clean = posixpath.normpath(name.replace("\\", "/"))
         if not _is_inside(clean):
-            self._source.find(f"{what} {name[:80]!r} lies outside the archive and was not read")
+            self._source.add_finding(f"{what} {name[:80]!r} lies outside the archive and was not read")
             return None
         if clean not in self.names:
-            self._source.find(f"{what} {name[:80]!r} is not in the archive; carried on without it")
+            self._source.add_finding(f"{what} {name[:80]!r} is not in the archive; carried on without it")
             return None
         try:
             return self._zip.read(clean)
         except (zipfile.BadZipFile, OSError, EOFError):
-            self._source.find(f"{what} {name[:80]!r} is broken; carried on without it")
+            self._source.add_finding(f"{what} {name[:80]!r} is broken; carried on without it")
             return None
 
     def check_layers(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, Unclear, rotation_of
+from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, NoFrame, rotation_of
 
 _STEP_SHARE = 0.025  # fraction of the longest side: distance between slices
 _WIDER, _THINNER = 1.7, 0.45  # times the median radius of the slices so far; beyond these another part begins
@@ -31,15 +31,15 @@ def axis_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> 
         values, vectors = np.linalg.eigh(np.cov((positions[around] - positions[around].mean(0)).T))
         if values[2] < 1.6 * values[1]:
             continue
-        slices = _followed(surface, center, vectors[:, 2])
+        slices = _trace_slices(surface, center, vectors[:, 2])
         if best is None or len(slices) > len(best):
             best = slices
     if best is None or len(best) < 3:
-        return Unclear("nothing long is where the point is")
+        return NoFrame("nothing long is where the point is")
     return _line(surface, best)
 
 
-def _followed(surface: FramedMesh, center: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def _trace_slices(surface: FramedMesh, center: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Return the centres and radii of slices ``(S, 4)`` along a part, from one end to the other."""
     first = _slice(surface, center, direction, 0.3 * surface.size_m)
     if first is None:
@@ -92,9 +92,9 @@ def _line(surface: FramedMesh, slices: np.ndarray) -> Found:
     off = np.linalg.norm(middles - mean - along[:, None] * direction, axis=1)
     width = 2 * float(np.median(slices[:, 3]))
     if length < _SLENDER * width:
-        return Unclear("what is around the point is about as wide as long")
+        return NoFrame("what is around the point is about as wide as long")
     if off.max() > _BENT_SHARE * length:
-        return Unclear("the part at the point is bent: it has no straight axis")
+        return NoFrame("the part at the point is bent: it has no straight axis")
     middle = mean + direction * (along.min() + along.max()) / 2
     bulk = surface.mesh.bounds.mean(0) + surface.center_of_mass_m - 2 * middle
     z = direction if bulk @ direction > 0 else -direction

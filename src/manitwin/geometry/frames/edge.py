@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Unclear, rotation_of
+from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, NoFrame, rotation_of
 
 _ANGLE_COSINE = np.cos(np.radians(40))  # outline normals this close to a side's belong to that side
 _CELLS = 96  # along the longer side of the plate's outline
@@ -33,7 +33,7 @@ def edge_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> 
         if plate is not None:
             break
     if plate is None:
-        return Unclear("the matter around the point is no thin plate")
+        return NoFrame("the matter around the point is no thin plate")
     points, thickness = plate
     middle = points.mean(0)
     _, vectors = np.linalg.eigh(np.cov((points - middle).T))
@@ -42,13 +42,13 @@ def edge_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> 
     at = (point_m - middle) @ basis
     outline, outward = _outline(flat, surface.spacing_m)
     if len(outline) < 12:
-        return Unclear("the plate around the point has no outline")
+        return NoFrame("the plate around the point has no outline")
     found = _sides(outline, outward, flat, thickness, at, surface.spacing_m)
     if not found:
-        return Unclear("no side of the plate around the point is straight")
+        return NoFrame("no side of the plate around the point is straight")
     found.sort(key=lambda side: -side[0])
     if len(found) > 1 and found[0][0] < _CLEAR * found[1][0]:
-        return Unclear("two sides of the plate around the point could be the edge")
+        return NoFrame("two sides of the plate around the point could be the edge")
     _, ends, out = found[0]
     line = basis @ (ends[1] - ends[0])
     length = float(np.linalg.norm(line))

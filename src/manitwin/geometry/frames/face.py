@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.geometry.distance import closest_points_on_triangles
-from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, Unclear, rotation_of
-from manitwin.geometry.frames.on_feature import ON_FEATURE_M
+from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, NoFrame, rotation_of
+from manitwin.geometry.frames.feature_deviation import ON_FEATURE_M
 from manitwin.geometry.frames.patch import Patch, flat_patch
 
 # deviation from the patch's normal; the face of a scanned mallet, flat to 0.9 mm, stays within it
@@ -50,7 +50,7 @@ def face_frame(
     if end_on:
         found = [patch for patch in found if _depth(surface, patch) > _END_ON]
     if not found:
-        return Unclear("no flat end is where the point is" if end_on else "nothing flat is where the point is")
+        return NoFrame("no flat end is where the point is" if end_on else "nothing flat is where the point is")
     if end_on:
         best = max(found, key=lambda patch: _depth(surface, patch) - _away(patch, surface, point_m) / _radius(patch))
     elif towards is not None:  # the label states the side: take its largest face, not the ring around a recess
@@ -72,7 +72,7 @@ def button_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -
         and _away(patch, surface, point_m) < _ON_BUTTON * surface.size_m
     ]
     if not found:
-        return Unclear("no small patch stands out of what is around it")
+        return NoFrame("no small patch stands out of what is around it")
     best = max(found, key=lambda patch: _fit(surface, patch, point_m, normal))
     x = best.long_axis if best.elongation > _OBLONG else UP
     return FeatureFrame("button", best.center_m, rotation_of(best.normal, x), _radius(best), best.elongation <= _OBLONG)
@@ -96,7 +96,7 @@ def _steady_normal(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray,
 _MOST_BESIDE = 8  # number of samples beside an edge that are tried
 
 
-def _beside(
+def _find_steady_sample(
     surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, reach_m: float
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """Return the nearest sample beside a point on an edge with a uniform normal close to the point's own, and that mean
@@ -124,9 +124,9 @@ def surface_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) 
     reach = max(0.02 * surface.size_m, 2.5 * surface.spacing_m)
     mean = _steady_normal(surface, point_m, normal, reach)
     if mean is None:
-        point_m, mean = _beside(surface, point_m, normal, reach)
+        point_m, mean = _find_steady_sample(surface, point_m, normal, reach)
     if mean is None:
-        return Unclear("the surface turns too sharply where the point is")
+        return NoFrame("the surface turns too sharply where the point is")
     z = mean / np.linalg.norm(mean)
     near = surface.near(point_m, 0.25 * surface.size_m)
     near = near[np.argsort(np.linalg.norm(positions[near] - point_m, axis=1), kind="stable")]
@@ -189,7 +189,7 @@ def _rough(patch: Patch) -> float:
 
 def _is_button(surface: FramedMesh, patch: Patch) -> bool:
     small = _LEAST_RADIUS_SHARE / 3 * surface.size_m < _radius(patch) < _BUTTON_SHARE * surface.size_m
-    return small and _rough(patch) < _BUTTON_ROUGH and _stands_out(surface, patch)
+    return small and _rough(patch) < _BUTTON_ROUGH and _is_raised(surface, patch)
 
 
 def _recess_share(surface: FramedMesh, patch: Patch, towards: np.ndarray) -> float:
@@ -216,7 +216,7 @@ def _fit(surface: FramedMesh, patch: Patch, point_m: np.ndarray, wanted: np.ndar
     return float(patch.normal @ wanted) - away - 2 * _rough(patch)
 
 
-def _stands_out(surface: FramedMesh, patch: Patch) -> bool:
+def _is_raised(surface: FramedMesh, patch: Patch) -> bool:
     """Return whether most of the surface just around a patch lies below its plane."""
     positions, _ = surface.samples
     radius = _radius(patch)

@@ -47,13 +47,13 @@ class FeatureFrame:
 
 
 @dataclass(frozen=True)
-class Unclear:
+class NoFrame:
     """The reason why there is no frame, as a completion of 'no frame: ...'."""
 
     reason: str
 
 
-Found = FeatureFrame | Unclear
+Found = FeatureFrame | NoFrame
 
 
 def rotation_of(z: np.ndarray, x: np.ndarray = UP) -> np.ndarray:

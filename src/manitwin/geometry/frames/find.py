@@ -7,11 +7,17 @@ import numpy as np
 from manitwin.geometry.frames.axis import axis_frame
 from manitwin.geometry.frames.edge import edge_frame
 from manitwin.geometry.frames.face import button_frame, face_frame, surface_frame
-from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Kind, Unclear
+from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Kind, NoFrame
 from manitwin.geometry.frames.hole import hole_frame
+from manitwin.geometry.frames.label_keywords import (
+    face_direction_for_label,
+    frame_kinds_for_label,
+    is_end_face_label,
+    is_pouring_label,
+    may_project_sideways,
+)
 from manitwin.geometry.frames.opening import opening_frame
 from manitwin.geometry.frames.tip import tip_frame
-from manitwin.geometry.frames.words import ahead_or_aside, direction_for, is_end, kinds_for, pours
 
 
 def find_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label: str) -> Found:
@@ -21,14 +27,14 @@ def find_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, lab
     never replaced by that of another feature.
     """
     reasons = []
-    for kind in kinds_for(label):
-        found = _of_kind(surface, point_m, normal, label, kind)
+    for kind in frame_kinds_for_label(label):
+        found = _frame_of_kind(surface, point_m, normal, label, kind)
         if isinstance(found, FeatureFrame):
-            if kind == "tip" and ahead_or_aside(label) and _flat_aside(surface, point_m, normal, found):
-                return Unclear("tip: the end and the flat place beside it look different ways")
+            if kind == "tip" and may_project_sideways(label) and _flat_aside(surface, point_m, normal, found):
+                return NoFrame("tip: the end and the flat place beside it look different ways")
             return found
         reasons.append(f"{kind}: {found.reason}")
-    return Unclear("; ".join(reasons[:2]))
+    return NoFrame("; ".join(reasons[:2]))
 
 
 _SAME_WAY = np.cos(np.radians(25.0))
@@ -39,15 +45,15 @@ def _flat_aside(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, ti
     return isinstance(face, FeatureFrame) and float(face.z @ tip.z) < _SAME_WAY
 
 
-def _of_kind(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label: str, kind: Kind) -> Found:
+def _frame_of_kind(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label: str, kind: Kind) -> Found:
     if kind == "face":
-        return face_frame(surface, point_m, normal, direction_for(label), is_end(label))
+        return face_frame(surface, point_m, normal, face_direction_for_label(label), is_end_face_label(label))
     if kind == "opening":
         return opening_frame(surface, point_m)
     if kind == "hole":
-        return hole_frame(surface, point_m, normal, through=kinds_for(label)[0] != "hole")
+        return hole_frame(surface, point_m, normal, through=frame_kinds_for_label(label)[0] != "hole")
     if kind == "tip":
-        return tip_frame(surface, point_m, normal, pours(label))
+        return tip_frame(surface, point_m, normal, is_pouring_label(label))
     return _BY_PLACE[kind](surface, point_m, normal)
 
 

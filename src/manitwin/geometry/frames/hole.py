@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Unclear, rotation_of
+from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, NoFrame, rotation_of
 
 _TURNS = 48  # rays around the axis
 _CLOSED_SHARE = 0.9  # fraction of the rays that must hit a wall; otherwise it is a notch or a jaw
@@ -34,7 +34,7 @@ def hole_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, thr
     """
     best: tuple[float, np.ndarray, np.ndarray, float] | None = None
     for center, axis in _starts(surface, point_m, normal):
-        fitted = _fitted(surface, center, axis)
+        fitted = _fit_hole(surface, center, axis)
         if fitted is None:
             continue
         center, axis, radius = fitted
@@ -47,8 +47,8 @@ def hole_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, thr
             if score < _ON_WALL:
                 break
     if best is None:
-        return Unclear("no wall around the point closes to a hole")
-    return _framed(surface, *best[1:])
+        return NoFrame("no wall around the point closes to a hole")
+    return _place_frame(surface, *best[1:])
 
 
 def _starts(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -106,7 +106,7 @@ def _open_axis(surface: FramedMesh, center: np.ndarray, across: np.ndarray) -> n
     return np.asarray(around[gap])
 
 
-def _fitted(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
+def _fit_hole(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
     """Return centre, axis and inscribed radius of the hole around a start; None if its walls are not closed."""
     for _ in range(_ROUNDS):
         walls, normals, closed = _throat(surface, center, axis)
@@ -202,12 +202,12 @@ def _closed(surface: FramedMesh, center: np.ndarray, axis: np.ndarray, radius: f
     return [bool(np.mean(np.isfinite(end)) > 0.7) for end in ends]
 
 
-def _framed(surface: FramedMesh, center: np.ndarray, axis: np.ndarray, radius: float) -> Found:
+def _place_frame(surface: FramedMesh, center: np.ndarray, axis: np.ndarray, radius: float) -> Found:
     """Place a hole's frame at its middle, or at its mouth if one end is closed."""
     both = np.stack([axis, -axis])
     closed = _closed(surface, center, axis, radius)
     if all(closed):
-        return Unclear("the hollow at the point has no mouth")
+        return NoFrame("the hollow at the point has no mouth")
     reach = [_mouth_m(surface, center, d, radius) for d in both]
     if any(closed):
         out = 1 if closed[0] else 0

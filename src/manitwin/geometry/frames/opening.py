@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.geometry.cavity import Opening
-from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Unclear, rotation_of
+from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, NoFrame, rotation_of
 
 _TURNS = 72
 _LAYERS = 16
@@ -27,16 +27,16 @@ def opening_frame(surface: FramedMesh, point_m: np.ndarray) -> Found:
     """
     opening = surface.opening
     if opening is None:
-        return Unclear("nothing here would hold water")
+        return NoFrame("nothing here would hold water")
     offset = point_m - opening.center_m
     above = float(offset @ opening.axis)
     radial = float(np.linalg.norm(offset - above * opening.axis))
     if radial > _NEAR_RADII * opening.rim_radius_m + 0.01 or above < -1.2 * opening.depth_m - 0.01:
-        return Unclear("the point is not at the opening")
+        return NoFrame("the point is not at the opening")
     rim = rim_points(surface, opening)
     met = np.isfinite(rim[:, 0])
     if met.mean() < 0.6:
-        return Unclear("the rim of the opening is not closed")
+        return NoFrame("the rim of the opening is not closed")
     axis, center = _plane(rim[met], opening)
     x, free = _pour_direction(surface, opening, rim, axis, center)
     return FeatureFrame("opening", center, rotation_of(axis, x), opening.rim_radius_m, free)
@@ -112,7 +112,7 @@ def _pour_direction(
     radius = np.hypot(*flat.T)
     radius = np.where(np.isfinite(radius), radius, np.nanmedian(radius))
     azimuth = np.arange(_TURNS) * 2 * np.pi / _TURNS
-    outer = _outside(surface, basis, center, opening)
+    outer = _handle_and_spout_azimuths(surface, basis, center, opening)
     handle, spout = outer
     one_sided = _odd_part(radius / np.median(radius) - 1)
     if handle is not None:
@@ -145,7 +145,7 @@ def _turn(a: np.ndarray, b: float) -> np.ndarray:
     return np.abs((a - b + np.pi) % (2 * np.pi) - np.pi)
 
 
-def _outside(
+def _handle_and_spout_azimuths(
     surface: FramedMesh, basis: np.ndarray, center: np.ndarray, opening: Opening
 ) -> tuple[float | None, float | None]:
     """Return the azimuths (rad) of a single handle and of a spout beside the body; None if absent.

@@ -56,7 +56,7 @@ def flat_patch(
         weight = areas[chosen] / areas[chosen].sum()
         mean = weight @ normals[chosen]
         normal, origin = mean / np.linalg.norm(mean), weight @ centers[chosen]
-    return _measured(surface, chosen, normal, origin)
+    return _measure_patch(surface, chosen, normal, origin)
 
 
 def _components(corners: np.ndarray) -> np.ndarray:
@@ -75,7 +75,7 @@ def _above(surface: FramedMesh, faces: np.ndarray, point_m: np.ndarray, normal: 
     return np.asarray((turns >= 0).all(1) | (turns <= 0).all(1))
 
 
-def _measured(surface: FramedMesh, faces: np.ndarray, normal: np.ndarray, center_m: np.ndarray) -> Patch:
+def _measure_patch(surface: FramedMesh, faces: np.ndarray, normal: np.ndarray, center_m: np.ndarray) -> Patch:
     _, _, _, areas = surface.corners
     triangles = surface.mesh.triangles[faces] - center_m
     weight = areas[faces] / areas[faces].sum()

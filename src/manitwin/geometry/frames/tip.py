@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, Unclear, rotation_of
+from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, NoFrame, rotation_of
 from manitwin.geometry.frames.opening import opening_frame, rim_points
 
 # Fractions of the longest side: neighbourhoods of the point in which an elongated direction is sought
@@ -35,11 +35,11 @@ def tip_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, pour
             beyond = float((surface.mesh.vertices @ frame.z).max() - frame.position_m @ frame.z)
             ends.append((away + 0.5 * beyond, frame))
     if not ends:
-        return Unclear("nothing around the point ends in a tip")
+        return NoFrame("nothing around the point ends in a tip")
     score, best = min(ends, key=lambda end: end[0])
     near = _RIVAL[0] * score + _RIVAL[1] * surface.size_m
     if any(frame.z @ best.z < _SAME_WAY for other, frame in ends if other < near):
-        return Unclear("what is around the point ends in several directions")
+        return NoFrame("what is around the point ends in several directions")
     return best
 
 
@@ -105,7 +105,7 @@ def _is_end(surface: FramedMesh, tip: np.ndarray, direction: np.ndarray, blunt: 
 def _lip(surface: FramedMesh, point_m: np.ndarray) -> FeatureFrame | None:
     """Return the frame of the lip of a rim if the point is on its side; otherwise None."""
     opening = opening_frame(surface, point_m)
-    if isinstance(opening, Unclear) or opening.roll_free or surface.opening is None or opening.z[2] < 0.9:
+    if isinstance(opening, NoFrame) or opening.roll_free or surface.opening is None or opening.z[2] < 0.9:
         return None
     rim = rim_points(surface, surface.opening)
     rim = rim[np.isfinite(rim[:, 0])]

@@ -10,13 +10,13 @@ from functools import partial
 
 import numpy as np
 
+from manitwin.geometry.parts.asymmetric_features import case, lens, spine, strap, teeth
 from manitwin.geometry.parts.feature_names import Feature
 from manitwin.geometry.parts.outermost import beam, bow, crest, outlet
-from manitwin.geometry.parts.scores import near as _near
-from manitwin.geometry.parts.scores import share_of_height as _share_of_height
+from manitwin.geometry.parts.scores import gaussian_falloff as _near
+from manitwin.geometry.parts.scores import relative_height as _share_of_height
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, SurfacePoints
 from manitwin.geometry.parts.striking_face import handle_direction, handle_line, striking_face
-from manitwin.geometry.parts.uneven import case, lens, spine, strap, teeth
 
 
 def feature_scores(feature: Feature, shape: Shape, points: SurfacePoints) -> np.ndarray | None:
@@ -36,7 +36,7 @@ def _rim(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     within = np.where(radial < 1.5 * opening.rim_radius_m + 0.01, 1.0, 0.1)
     scores = height * within * (0.4 + 0.6 * _near(np.maximum(points.thickness_m - 0.012, 0), 0.012))
     if shape.side_handle is not None:
-        scores = np.where(shape.body.belongs(points.positions_m, shape.side_handle), 0.1 * scores, scores)
+        scores = np.where(shape.body.protrusion_mask(points.positions_m, shape.side_handle), 0.1 * scores, scores)
     return scores * np.where(radial > 0.6 * opening.rim_radius_m, 1.0, 0.2)
 
 
@@ -81,7 +81,7 @@ def _inside(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
 
 def _handle(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     if shape.side_handle is not None:
-        mine = shape.body.belongs(points.positions_m, shape.side_handle)
+        mine = shape.body.protrusion_mask(points.positions_m, shape.side_handle)
         if shape.side_handle.bail is not None:  # held at its highest stretch
             return mine * _near(1 - _share_of_height(shape, points), 0.15)
         outside = shape.body.outside_m(points.positions_m) / shape.side_handle.reach_m
@@ -100,7 +100,7 @@ def _handle_end(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
         return _handle(shape, points)
     if shape.side_handle is not None:
         outside = shape.body.outside_m(points.positions_m) / shape.side_handle.reach_m
-        return shape.body.belongs(points.positions_m, shape.side_handle) * _near(outside - 0.9, 0.15)
+        return shape.body.protrusion_mask(points.positions_m, shape.side_handle) * _near(outside - 0.9, 0.15)
     if not shape.has_ends:
         return None
     return _near(shape.axis.along(points.positions_m) - 0.95, 0.08)
@@ -172,7 +172,7 @@ def _spout(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     others = [p for p in shape.body.protrusions if p is not shape.side_handle]
     high = 0.3 + 0.7 * _share_of_height(shape, points)
     if others and others[0].reach_m > 0.3 * LEAST_HANDLE_REACH * shape.body.radius_m.max():
-        return shape.body.belongs(points.positions_m, others[0]) * high
+        return shape.body.protrusion_mask(points.positions_m, others[0]) * high
     rim = _rim(shape, points)
     if rim is None:
         rim = _top(shape, points)
@@ -186,7 +186,7 @@ def _top(shape: Shape, points: SurfacePoints) -> np.ndarray:
         return _near(1 - _share_of_height(shape, points), 0.12) * facing
     low = shape.bounds_m[0, 2]  # the top of the body, below the bail
     below = 1 - (points.positions_m[:, 2] - low) / max(handle.low_m - low, 1e-9)
-    beside = ~shape.body.belongs(points.positions_m, handle) & (shape.body.outside_m(points.positions_m) <= 0)
+    beside = ~shape.body.protrusion_mask(points.positions_m, handle) & (shape.body.outside_m(points.positions_m) <= 0)
     return _near(below, 0.12) * facing * beside
 
 
@@ -217,7 +217,7 @@ def _side(shape: Shape, points: SurfacePoints) -> np.ndarray:
     outward = np.einsum("ij,ij->i", points.normals[:, :2], radial) > 0
     scores = _near(_share_of_height(shape, points) - at, 0.15) * sideways * np.where(outward, 1.0, 0.2)
     if shape.side_handle is not None:
-        scores = np.where(shape.body.belongs(points.positions_m, shape.side_handle), 0.1 * scores, scores)
+        scores = np.where(shape.body.protrusion_mask(points.positions_m, shape.side_handle), 0.1 * scores, scores)
     return scores
 
 

@@ -10,7 +10,7 @@ _MIDDLE_SHARE = 0.2  # fraction of the length: the shaft to either side of the m
 _BENT = 0.25  # of its width: offset of a hook's centre from the line of the shaft, which enters one side of it
 
 
-def straight_is_last(share: np.ndarray, across_m: np.ndarray) -> bool | None:
+def is_straight_end_last(share: np.ndarray, across_m: np.ndarray) -> bool | None:
     """Return whether the straight end, in line with the middle, comes last; None if neither end is bent, or both are.
 
     The line is fitted to the slices of the middle, because the box leans if one end extends to a side.

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from manitwin.geometry.parts.scores import near, share_of_height
+from manitwin.geometry.parts.scores import gaussian_falloff, relative_height
 from manitwin.geometry.parts.shape import Shape, SurfacePoints
 
 _OUTLETS_FROM = 0.85  # fraction of the height: outlets of pumps and triggers are above, triggers below
@@ -28,7 +28,7 @@ def outlet(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     if radius.max() < _LOPSIDED * behind:
         return None
     reach = np.clip((points.positions_m[:, :2] - shape.body.axis_xy_m) @ out / radius.max(), 0, 1)
-    return near(1 - share_of_height(shape, points), 0.12) * reach**2
+    return gaussian_falloff(1 - relative_height(shape, points), 0.12) * reach**2
 
 
 def crest(shape: Shape, points: SurfacePoints) -> np.ndarray:
@@ -38,21 +38,23 @@ def crest(shape: Shape, points: SurfacePoints) -> np.ndarray:
     reach = (shape.surface_m - shape.center_of_mass_m) @ across
     sign = 1.0 if reach.max() > -reach.min() else -1.0
     out = sign * (points.positions_m - shape.center_of_mass_m) @ across
-    return near(1 - out / max(float((sign * reach).max()), 1e-9), 0.12)
+    return gaussian_falloff(1 - out / max(float((sign * reach).max()), 1e-9), 0.12)
 
 
 def bow(shape: Shape, points: SurfacePoints) -> np.ndarray:
     """Score the centres of both ends along the direction of travel: the nose and tail of an aircraft."""
     along, across, length_m, width_m = _travel(shape)
     ahead, aside = _from_middle(shape, points.positions_m, along, across)
-    return near(1 - np.abs(ahead) / (length_m / 2), 0.12) * (0.3 + 0.7 * near(aside / (width_m / 2), 0.15))
+    return gaussian_falloff(1 - np.abs(ahead) / (length_m / 2), 0.12) * (
+        0.3 + 0.7 * gaussian_falloff(aside / (width_m / 2), 0.15)
+    )
 
 
 def beam(shape: Shape, points: SurfacePoints) -> np.ndarray:
     """Score the farthest extents on both sides of the direction of travel: the tips of wings."""
     along, across, _, width_m = _travel(shape)
     _, aside = _from_middle(shape, points.positions_m, along, across)
-    return near(1 - np.abs(aside) / (width_m / 2), 0.12)
+    return gaussian_falloff(1 - np.abs(aside) / (width_m / 2), 0.12)
 
 
 def _from_middle(
@@ -70,14 +72,14 @@ def _travel(shape: Shape) -> tuple[np.ndarray, np.ndarray, float, float]:
     """
     level = np.argsort(np.abs(shape.obb_to_object[2, :3]), kind="stable")[:2]
     long, short = sorted(level, key=lambda axis: -float(shape.obb_extents_m[axis]))
-    unlike = {axis: _unlike_its_mirror_image(shape, int(axis)) for axis in (long, short)}
+    unlike = {axis: _mirror_asymmetry(shape, int(axis)) for axis in (long, short)}
     if unlike[short] > _UNLIKE and unlike[long] < _MIRRORED * unlike[short]:
         long, short = short, long
     axes, extents = shape.obb_to_object[:3, :3].T, np.maximum(shape.obb_extents_m, 1e-9)
     return axes[long], axes[short], float(extents[long]), float(extents[short])
 
 
-def _unlike_its_mirror_image(shape: Shape, axis: int) -> float:
+def _mirror_asymmetry(shape: Shape, axis: int) -> float:
     """Return the distance of the surface from its mirror image along a box axis, in half extents (earth mover's distance)."""
     along = np.sort((shape.surface_m - shape.obb_to_object[:3, 3]) @ shape.obb_to_object[:3, axis])
     half = max(float(shape.obb_extents_m[axis]) / 2, 1e-9)

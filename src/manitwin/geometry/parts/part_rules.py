@@ -45,7 +45,7 @@ def _handled(shape: Shape, points_m: np.ndarray) -> Membership | None:
     found = _handles(shape)
     if not found:
         return None
-    mine = np.logical_or.reduce([shape.body.belongs(points_m, each) for each in found])
+    mine = np.logical_or.reduce([shape.body.protrusion_mask(points_m, each) for each in found])
     return Membership(("body", "handle"), mine.astype(int), _reach_confidence(shape, found[0]))
 
 
@@ -54,12 +54,12 @@ def _spouted(shape: Shape, points_m: np.ndarray) -> Membership | None:
     found = _handles(shape)
     if not found:
         return None
-    index = shape.body.belongs(points_m, found[0]).astype(int)
+    index = shape.body.protrusion_mask(points_m, found[0]).astype(int)
     if found[0].bail is not None:
         found = [found[0], *shape.body.protrusions]
     opposite = [p for p in found[1:] if found[0].bail is not None or np.cos(p.azimuth_rad - found[0].azimuth_rad) < 0]
     if opposite:
-        index[shape.body.belongs(points_m, opposite[0])] = 2
+        index[shape.body.protrusion_mask(points_m, opposite[0])] = 2
     return Membership(("body", "handle", "spout"), index, _reach_confidence(shape, found[0]))
 
 

@@ -62,13 +62,13 @@ class RoundBody:
         offset = points_m[:, :2] - self.axis_xy_m
         return np.arctan2(offset[:, 1], offset[:, 0])
 
-    def belongs(self, points_m: np.ndarray, protrusion: Protrusion) -> np.ndarray:
+    def protrusion_mask(self, points_m: np.ndarray, protrusion: Protrusion) -> np.ndarray:
         """Return which points ``(N, 3)`` belong to a protrusion."""
         if protrusion.bail is not None:
             return protrusion.bail.contains(points_m, points_m[:, :2] - self.axis_xy_m, self.outside_m(points_m))
         turn = np.abs((self.azimuth(points_m) - protrusion.azimuth_rad + np.pi) % (2 * np.pi) - np.pi)
         beside = (self.outside_m(points_m) > 0) & (turn <= protrusion.half_width_rad)
-        return beside if self.over is None else beside & ~self.belongs(points_m, self.over)
+        return beside if self.over is None else beside & ~self.protrusion_mask(points_m, self.over)
 
     def _limit(self, points_m: np.ndarray) -> np.ndarray:
         return _OUT_BY * self.radius_at(points_m) + _OUT_BY_SHARE * self.radius_m.max()
@@ -96,7 +96,7 @@ def round_body(surface_m: np.ndarray, axis_xy_m: np.ndarray | None = None) -> Ro
     outline = np.interp(heights, heights[occupied], outline[occupied])
     body = RoundBody(axis_xy_m, heights, outline, float(heights[_longest_run(occupied)[-1]]), ())
     body = replace(body, over=_over(body, surface_m))
-    beside = surface_m if body.over is None else surface_m[~body.belongs(surface_m, body.over)]
+    beside = surface_m if body.over is None else surface_m[~body.protrusion_mask(surface_m, body.over)]
     return replace(body, protrusions=_protrusions(body, beside))
 
 
@@ -107,7 +107,7 @@ def _over(body: RoundBody, surface_m: np.ndarray) -> Protrusion | None:
     if bail is None:
         return None
     found = Protrusion(0.0, np.pi, bail.rise_m, 0.0, bail.rise_m, bail.low_m, bail)
-    return replace(found, share=float(body.belongs(surface_m, found).mean()))
+    return replace(found, share=float(body.protrusion_mask(surface_m, found).mean()))
 
 
 def _longest_run(flags: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from manitwin.geometry.parts.cut_up import cut_up
+from manitwin.geometry.parts.edge_subdivision import subdivide_long_edges
 from manitwin.geometry.parts.membership import PartRule
 from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.parts.shape import Shape
@@ -29,7 +29,7 @@ class Segmentation:
     confidence: float
 
 
-def segmented(mesh: trimesh.Trimesh, shape: Shape, rule: PartRule) -> Segmentation | None:
+def segment_by_rule(mesh: trimesh.Trimesh, shape: Shape, rule: PartRule) -> Segmentation | None:
     """Return the parts of a closed mesh by the rule for its form; None if it does not show at least two of them."""
     graph = SurfaceGraph(mesh)
     found = membership(rule, shape, graph.centers_m) or skin_membership(rule, shape, graph, mesh)
@@ -40,11 +40,11 @@ def segmented(mesh: trimesh.Trimesh, shape: Shape, rule: PartRule) -> Segmentati
     if len(large) < 2:
         return None
     index = np.where(np.isin(found.index, large), found.index, large[shares[large].argmax()])
-    role = graph.of_faces(graph.grown(index, found.band_share))
+    role = graph.labels_by_face(graph.regrow_labels(index, found.band_share))
     return Segmentation(found.roles, role, found.confidence)
 
 
-def carried_over(labels: np.ndarray, mesh: trimesh.Trimesh, to: trimesh.Trimesh) -> np.ndarray:
+def transfer_face_labels(labels: np.ndarray, mesh: trimesh.Trimesh, to: trimesh.Trimesh) -> np.ndarray:
     """Transfer face labels ``(F,)`` of a mesh to the faces ``(G,)`` of another mesh of the same surface.
 
     Each face takes the label of the nearest piece with a similar normal, as both sides of a thin wall are near.
@@ -54,7 +54,7 @@ def carried_over(labels: np.ndarray, mesh: trimesh.Trimesh, to: trimesh.Trimesh)
     same_face = (apart < _SAME_M) & (np.einsum("ij,ij->i", np.asarray(mesh.face_normals)[same], normals) > 0)
     if same_face.all():
         return np.asarray(labels[same])
-    vertices, faces, of_face = cut_up(mesh.vertices, mesh.faces, EDGE_SHARE * float(mesh.extents.max()))
+    vertices, faces, of_face = subdivide_long_edges(mesh.vertices, mesh.faces, EDGE_SHARE * float(mesh.extents.max()))
     pieces = trimesh.Trimesh(vertices, faces, process=False)
     count = min(_NEIGHBOURS, len(faces))
     _, near = cKDTree(pieces.triangles_center).query(centers, k=count)

@@ -12,7 +12,7 @@ from manitwin.geometry.boxes import mirror_axis, oriented_bounding_box
 from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.parts.arch import Arch, find_arch
 from manitwin.geometry.parts.feature_names import HeadEnd
-from manitwin.geometry.parts.hooked_end import straight_is_last
+from manitwin.geometry.parts.hooked_end import is_straight_end_last
 from manitwin.geometry.parts.outline import SLICES
 from manitwin.geometry.parts.pistol import Pistol, find_pistol
 from manitwin.geometry.parts.protrusions import Protrusion, RoundBody, round_body
@@ -73,7 +73,7 @@ def long_axis(
     width, thickness = _outline(share, local[:, 1:])
     center_share = float((center_of_mass_m - obb_to_object[:3, 3]) @ axes[0] / length + 0.5)
     last = _shorter_is_last(share, local[:, 1:], length) if head_end == "short" else None
-    last = straight_is_last(share, local[:, 1:]) if head_end == "straight" else last
+    last = is_straight_end_last(share, local[:, 1:]) if head_end == "straight" else last
     if _head_is_last(head_end, width, thickness, center_share, axes[0]) if last is None else last:
         axes[0], width, thickness, center_share = -axes[0], width[::-1], thickness[::-1], 1 - center_share
     return LongAxis(

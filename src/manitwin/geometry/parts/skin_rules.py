@@ -53,15 +53,15 @@ def _open(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membershi
         return None
     centers, normals = graph.centers_m, graph.normals
     caster = RayCaster(mesh)
-    inside = _seen_from_within(opening, caster, centers, normals)
+    inside = _visible_from_cavity(opening, caster, centers, normals)
     if graph.areas_m2[inside].sum() < _LEAST_INSIDE * graph.areas_m2.sum():
         return None
     low, high = shape.bounds_m[:, 2]
     flat = (normals[:, 2] < _DOWN) & (centers[:, 2] < low + max(_LOW * (high - low), _LOW_M))
     base = flat & _over_footprint(centers, graph.corners_m, _FOOT_MARGIN)
     vault = (normals[:, 2] < _VAULT) & _over_footprint(centers, graph.corners_m, 1.0)
-    base |= vault & ((normals[:, 2] < _DOWN) | _looks_at_itself(caster, centers, normals, asked=vault))
-    base &= ~inside & _seen_from_below(caster, centers, normals, asked=base & ~inside)
+    base |= vault & ((normals[:, 2] < _DOWN) | _facing_own_surface(caster, centers, normals, asked=vault))
+    base &= ~inside & _visible_from_below(caster, centers, normals, asked=base & ~inside)
     index = np.where(inside, 1, np.where(base, 3, 0))
     crest, around = _crest(opening, graph.corners_m)
     if around >= _LEAST_SECTORS:
@@ -84,7 +84,7 @@ def _over_footprint(centers_m: np.ndarray, corners_m: np.ndarray, margin: float)
     return np.asarray((widened @ planes.T + offsets <= 0).all(1))
 
 
-def _seen_from_below(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray, asked: np.ndarray) -> np.ndarray:
+def _visible_from_below(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray, asked: np.ndarray) -> np.ndarray:
     """Return, for the pieces ``asked (P,)``, whether nothing lies between them and the ground; False for all others."""
     seen, which = np.zeros(len(centers_m), bool), np.flatnonzero(asked)
     if len(which):
@@ -93,7 +93,7 @@ def _seen_from_below(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarr
     return seen
 
 
-def _looks_at_itself(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray, asked: np.ndarray) -> np.ndarray:
+def _facing_own_surface(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray, asked: np.ndarray) -> np.ndarray:
     """Return, for the pieces ``asked (P,)``, whether a horizontal ray along their normal hits the object; False for all
     others.
     """
@@ -106,7 +106,7 @@ def _looks_at_itself(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarr
     return seen
 
 
-def _seen_from_within(opening: Opening, caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _visible_from_cavity(opening: Opening, caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Return which pieces ``(P,)`` are visible from a point on the axis of the cavity."""
     start = opening.center_m - 1e-4 * opening.axis
     floor_m = float(caster.first_hits(start[None], -opening.axis[None])[0][0])
@@ -141,7 +141,7 @@ def _crest(opening: Opening, corners_m: np.ndarray) -> tuple[np.ndarray, float]:
 
 def _shown_by_faces(rim: np.ndarray, graph: SurfaceGraph) -> bool:
     """Return whether the mesh's own faces are small enough to represent a rim; a wall of one face from top to bottom is not."""
-    by_face = graph.of_pieces(graph.of_faces(rim))
+    by_face = graph.labels_by_piece(graph.labels_by_face(rim))
     both, either = (graph.areas_m2[which].sum() for which in (by_face & rim, by_face | rim))
     return bool(both > 0.5 * either)
 

@@ -12,7 +12,7 @@ import trimesh
 from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.csgraph import dijkstra
 
-from manitwin.geometry.parts.cut_up import cut_up
+from manitwin.geometry.parts.edge_subdivision import subdivide_long_edges
 
 EDGE_SHARE = 1 / 40  # fraction of the longest side: longer edges are subdivided
 # fraction of the longest side: scale at which creases and concavities are detected, above the noise
@@ -28,7 +28,9 @@ class SurfaceGraph:
     def __init__(self, mesh: trimesh.Trimesh):
         self.size_m = float(mesh.extents.max())
         places, corner = np.unique(np.asarray(mesh.vertices), axis=0, return_inverse=True)  # merges seams
-        vertices, faces, of_face = cut_up(places, corner.reshape(-1)[mesh.faces], EDGE_SHARE * self.size_m)
+        vertices, faces, of_face = subdivide_long_edges(
+            places, corner.reshape(-1)[mesh.faces], EDGE_SHARE * self.size_m
+        )
         self._mesh = trimesh.Trimesh(vertices, faces, process=False)
         self._of_face, self._face_count = of_face, len(mesh.faces)
 
@@ -52,7 +54,7 @@ class SurfaceGraph:
         """The areas ``(P,)`` of the pieces."""
         return np.asarray(self._mesh.area_faces)
 
-    def grown(self, labels: np.ndarray, band_share: float) -> np.ndarray:
+    def regrow_labels(self, labels: np.ndarray, band_share: float) -> np.ndarray:
         """Return labels ``(P,)`` that are kept away from their borders and regrown within a band, so that regions meet at
         concavities.
 
@@ -70,19 +72,19 @@ class SurfaceGraph:
             mine = labels == name
             width = min(band_share * self.size_m, 0.5 * float(away_m[mine & np.isfinite(away_m)].max(initial=0.0)))
             seeds = np.flatnonzero(mine & (away_m >= width))
-            reach.append(dijkstra(self._averse, indices=seeds, min_only=True))
+            reach.append(dijkstra(self._concavity_graph, indices=seeds, min_only=True))
         distance = np.stack(reach)
         found = names[distance.argmin(0)]
         return np.where(np.isfinite(distance.min(0)), found, labels)
 
-    def of_faces(self, labels: np.ndarray) -> np.ndarray:
+    def labels_by_face(self, labels: np.ndarray) -> np.ndarray:
         """Return the label of each original face ``(F,)``: that of the largest part of its area."""
         names, place = np.unique(labels, return_inverse=True)
         share = np.zeros((self._face_count, len(names)))
         np.add.at(share, (self._of_face, place), self.areas_m2 + 1e-15)
         return np.asarray(names[share.argmax(1)])
 
-    def of_pieces(self, labels: np.ndarray) -> np.ndarray:
+    def labels_by_piece(self, labels: np.ndarray) -> np.ndarray:
         """Return the label of each piece ``(P,)`` from those of the original faces ``(F,)``."""
         return np.asarray(labels[self._of_face])
 
@@ -100,7 +102,7 @@ class SurfaceGraph:
         return self._graph(self._steps_m)
 
     @cached_property
-    def _averse(self) -> csr_matrix:
+    def _concavity_graph(self) -> csr_matrix:
         """The graph in which crossing a concavity costs as much as a path across a good part of the object."""
         a, b = self._pairs.T
         normals = self._smooth_normals

@@ -145,7 +145,7 @@ def _glued_surface(surface: Surface, actions: list[str]) -> Surface:
         if not dangling.any() or dangling.all():
             break
         fins += int(dangling.sum())
-        surface = surface.only(~dangling)
+        surface = surface.select_faces(~dangling)
     wound = surface
     for _ in range(_MOST_ROUNDS):
         twin, crowded = nonmanifold.glue_faces(surface.vertices, surface.faces)
@@ -154,7 +154,7 @@ def _glued_surface(surface: Surface, actions: list[str]) -> Surface:
         if not stray.any() or stray.all():
             break
         strays += int(stray.sum())
-        surface = surface.only(~stray)
+        surface = surface.select_faces(~stray)
     crowded_edges = int((halfedges.group_edges(surface.faces, len(surface.vertices)).counts > 2).sum())
     for count, text in (
         (fins, "dropped {} faces that dangle from an edge with more than two faces"),
@@ -213,15 +213,15 @@ def _closed_surface(
         actions.append(
             f"dropped {int((flat & (filled.loop_of_face < 0)).sum())} faces of membranes that enclose nothing"
         )
-        outward, labels, sheet, is_lid = outward.only(~flat), labels[~flat], sheet[~flat], is_lid[~flat]
+        outward, labels, sheet, is_lid = outward.select_faces(~flat), labels[~flat], sheet[~flat], is_lid[~flat]
     if not len(lids):
         return outward, None
-    walls = thicken(outward.only(sheet & ~is_lid).with_split_vertices(), wall_m)
+    walls = thicken(outward.select_faces(sheet & ~is_lid).with_split_vertices(), wall_m)
     actions.append(
         f"gave an open sheet with {len(lids)} mouths (longest rim {1e3 * lengths[lids].max():.3g} mm)"
         f" a wall of {1e3 * wall_m:.3g} mm inward"
     )
-    return (outward.only(~sheet).followed_by(walls) if not sheet.all() else walls), wall_m
+    return (outward.select_faces(~sheet).followed_by(walls) if not sheet.all() else walls), wall_m
 
 
 def _flat(surface: Surface, labels: np.ndarray) -> np.ndarray:

@@ -44,7 +44,7 @@ class Surface:
         """Return the component label ``(F,)`` of every face."""
         return face_components(self.twin)
 
-    def only(self, keep: np.ndarray) -> Surface:
+    def select_faces(self, keep: np.ndarray) -> Surface:
         """Return the faces selected by ``keep (F,)``; half-edges glued to removed faces become boundary."""
         kept = np.flatnonzero(keep)
         where = np.full(len(self.faces), -1, dtype=np.int64)

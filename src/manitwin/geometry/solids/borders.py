@@ -12,7 +12,7 @@ SNAP = 0.005
 """Fraction of an edge: a crossing this close to an end is snapped to it, which avoids slivers."""
 
 
-def with_border(
+def cut_along_border(
     vertices: np.ndarray, faces: np.ndarray, chosen: np.ndarray, where: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Cut the chosen faces along the border of a spatial region; return vertices, faces, the original face of each, and

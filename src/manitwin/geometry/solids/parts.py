@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from manifold3d import Manifold
 
-from manitwin.geometry.solids.borders import with_border
-from manitwin.geometry.solids.shapes import checked
+from manitwin.geometry.solids.borders import cut_along_border
+from manitwin.geometry.solids.shapes import require_solid
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Assembly:
         ``bordered`` are regions, as (name, part), whose borders become mesh edges by cutting faces. Other regions consist of
         whole faces.
         """
-        mesh = checked(self._solid, "assembly").to_mesh()
+        mesh = require_solid(self._solid, "assembly").to_mesh()
         vertices = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3]
         faces = np.asarray(mesh.tri_verts, dtype=np.int64)
         merged = np.arange(len(vertices))
@@ -109,7 +109,7 @@ class Assembly:
         for name, of, where in self._regions:
             chosen = part == names.index(of)
             if (name, of) in bordered:
-                vertices, faces, origin, within = with_border(vertices, faces, chosen, where)
+                vertices, faces, origin, within = cut_along_border(vertices, faces, chosen, where)
                 part = part[origin]
             else:
                 within = chosen & where(vertices[faces].mean(axis=1))

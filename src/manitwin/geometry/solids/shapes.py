@@ -54,11 +54,11 @@ def box(x_m: float, y_m: float, z_m: float, *, radius_m: float = 0.0) -> Manifol
     """Return a box standing on z = 0, centred in x and y, with edges rounded by ``radius_m``."""
     radius_m = min(radius_m, 0.499 * min(x_m, y_m, z_m))
     if radius_m <= 0:
-        return checked(Manifold.cube((x_m, y_m, z_m), True).translate((0, 0, z_m / 2)), "box")
+        return require_solid(Manifold.cube((x_m, y_m, z_m), True).translate((0, 0, z_m / 2)), "box")
     ball = Manifold.sphere(radius_m, CORNER_SIDES)
     centers = product(*((-extent / 2 + radius_m, extent / 2 - radius_m) for extent in (x_m, y_m, z_m)))
     solid = Manifold.batch_hull([ball.translate(center) for center in centers])
-    return checked(solid.translate((0, 0, z_m / 2)), "box")
+    return require_solid(solid.translate((0, 0, z_m / 2)), "box")
 
 
 def prism(outline: CrossSection, height_m: float, *, radius_m: float = 0.0, top: float = 1.0) -> Manifold:
@@ -67,7 +67,7 @@ def prism(outline: CrossSection, height_m: float, *, radius_m: float = 0.0, top:
     ``top`` scales the outline about the origin towards the upper end, for prisms without rounding only.
     """
     if radius_m <= 0:
-        return checked(outline.extrude(height_m, 0, 0.0, (top, top)), "prism")
+        return require_solid(outline.extrude(height_m, 0, 0.0, (top, top)), "prism")
     radius_m = min(radius_m, 0.499 * height_m)
     angles = np.linspace(0.0, np.pi / 2, 5)
     # nested prisms, the narrowest highest: overlapping solids unite reliably, touching ones may not
@@ -78,7 +78,7 @@ def prism(outline: CrossSection, height_m: float, *, radius_m: float = 0.0, top:
         slabs.append(inner.extrude(height_m - 2 * low + 2e-6).translate((0, 0, low - 1e-6)))
     slabs.append(outline.extrude(height_m - 2 * radius_m).translate((0, 0, radius_m)))
     slabs.append(outline.offset(-radius_m, JoinType.Round, 2.0, CORNER_SIDES).extrude(height_m))
-    return checked(union(slabs), "prism")
+    return require_solid(union(slabs), "prism")
 
 
 def polygon(points: Sequence[Point] | np.ndarray, *, radius_m: float = 0.0) -> CrossSection:
@@ -105,7 +105,7 @@ def lathe(profile: Sequence[Point] | np.ndarray, *, sides: int | None = None) ->
     points = [(max(0.0, float(r)), float(z)) for r, z in profile]
     first, last = points[0], points[-1]
     points = [*([(0.0, first[1])] if first[0] > 0 else []), *points, *([(0.0, last[1])] if last[0] > 0 else [])]
-    return checked(CrossSection([np.array(points)], FillRule.NonZero).revolve(sides or chords(SIDES)), "lathe")
+    return require_solid(CrossSection([np.array(points)], FillRule.NonZero).revolve(sides or chords(SIDES)), "lathe")
 
 
 def cylinder(
@@ -113,18 +113,18 @@ def cylinder(
 ) -> Manifold:
     """Return a cylinder or frustum standing on z = 0."""
     top = radius_m if top_radius_m is None else top_radius_m
-    return checked(Manifold.cylinder(height_m, radius_m, top, sides or chords(SIDES)), "cylinder")
+    return require_solid(Manifold.cylinder(height_m, radius_m, top, sides or chords(SIDES)), "cylinder")
 
 
 def ellipsoid(x_m: float, y_m: float, z_m: float, *, sides: int | None = None) -> Manifold:
     """Return an ellipsoid with these full extents about the origin."""
-    return checked(Manifold.sphere(0.5, sides or chords(SIDES)).scale((x_m, y_m, z_m)), "ellipsoid")
+    return require_solid(Manifold.sphere(0.5, sides or chords(SIDES)).scale((x_m, y_m, z_m)), "ellipsoid")
 
 
 def torus(ring_radius_m: float, tube_radius_m: float, *, sides: int | None = None) -> Manifold:
     """Return a torus about Z, centred at the origin."""
     circle = CrossSection.circle(tube_radius_m, chords(CORNER_SIDES)).translate((ring_radius_m, 0))
-    return checked(circle.revolve(sides or chords(SIDES)), "torus")
+    return require_solid(circle.revolve(sides or chords(SIDES)), "torus")
 
 
 def union(solids: Sequence[Manifold]) -> Manifold:
@@ -152,7 +152,7 @@ def rounded(profile: Sequence[Point], radius_m: float, *, steps: int = 4) -> lis
     return [(float(r), float(z)) for r, z in [*out, points[-1]]]
 
 
-def checked(solid: Manifold, what: str) -> Manifold:
+def require_solid(solid: Manifold, what: str) -> Manifold:
     """Return the solid. Raises SolidError if it is empty or has no positive volume."""
     if solid.is_empty() or solid.volume() <= 0:
         raise SolidError(f"{what}: its measures give no solid; give others")

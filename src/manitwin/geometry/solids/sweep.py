@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from manifold3d import Manifold, Mesh
 
-from manitwin.geometry.solids.shapes import CORNER_SIDES, SolidError, checked, chords
+from manitwin.geometry.solids.shapes import CORNER_SIDES, SolidError, chords, require_solid
 
 
 def tube(
@@ -72,7 +72,7 @@ def loft(rings_m: np.ndarray, ends_m: np.ndarray | None = None) -> Manifold:
     end = np.stack([np.full(around, count * around + 1), last + edge, last + (edge + 1) % around], 1)
     faces = np.concatenate([walls, start, end])
     solid = Manifold(Mesh(vert_properties=vertices.astype(np.float32), tri_verts=faces.astype(np.uint32)))
-    return checked(solid, "loft")
+    return require_solid(solid, "loft")
 
 
 def arc(points: Sequence[Sequence[float]], *, samples: int = 24) -> np.ndarray:

@@ -9,7 +9,7 @@ _WITHOUT_DECOMPOSITION = str.maketrans(
 )
 
 
-def without_diacritics(text: str) -> str:
+def remove_diacritics(text: str) -> str:
     """Return a text in lower case with Latin letters without diacritics; other scripts are unchanged.
 
     Letters are decomposed (Unicode NFKD) and combining marks removed; letters without a decomposition are transliterated as

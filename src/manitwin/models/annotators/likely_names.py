@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.prior_records import Interval
 from manitwin.models.annotators.priors import unknown_prior
 from manitwin.twin.record_values import Estimate
@@ -20,14 +20,14 @@ _GRID = 2001
 
 
 @dataclass(frozen=True)
-class Usual:
+class UsualValues:
     """Usual values of an object that has one of several names, or none of them."""
 
     longest_axis_m: Estimate
     bulk_density_kg_m3: Estimate
 
 
-def usual_of(likely: Sequence[tuple[str, float]]) -> Usual:
+def usual_values(likely: Sequence[tuple[str, float]]) -> UsualValues:
     """Return the usual values of an object with one of the ``likely`` names (name, probability); the rest is an unknown object.
 
     An object that a classifier cannot name usually has the size of its guesses: pliers are taken for a can opener. The value
@@ -35,20 +35,20 @@ def usual_of(likely: Sequence[tuple[str, float]]) -> Usual:
     the unknown object if no name is in the priors.
     """
     anything = unknown_prior()
-    known = [(prior, share) for name, share in likely if (prior := lookup(name)) is not None]
+    known = [(prior, share) for name, share in likely if (prior := find_prior(name)) is not None]
     priors = [*(prior for prior, _ in known), anything]
     weights = np.array([*(share for _, share in known), max(0.0, 1.0 - sum(share for _, share in known))])
     source = OF_LIKELY_NAMES if known else anything.source
     densities = [
         each for prior in priors if (each := prior.bulk_density_kg_m3 or anything.bulk_density_kg_m3) is not None
     ]
-    return Usual(
-        _mixed([prior.longest_axis_m for prior in priors], weights).estimate(source),
-        _mixed(densities, weights).estimate(source),
+    return UsualValues(
+        _mixture_interval([prior.longest_axis_m for prior in priors], weights).estimate(source),
+        _mixture_interval(densities, weights).estimate(source),
     )
 
 
-def _mixed(intervals: list[Interval], weights: np.ndarray) -> Interval:
+def _mixture_interval(intervals: list[Interval], weights: np.ndarray) -> Interval:
     """Return the mean and the 90 % interval of a mixture of two-sided log-normals; a single interval is returned unchanged."""
     if len(intervals) == 1:
         return intervals[0]

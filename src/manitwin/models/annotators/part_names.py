@@ -64,7 +64,7 @@ _WORDS: dict[str, frozenset[str]] = {
 """For each part role, words that a label contains if it names the whole part instead of a place on it."""
 
 
-def roles_named(label: str, roles: Iterable[str]) -> list[str]:
+def roles_in_label(label: str, roles: Iterable[str]) -> list[str]:
     """Return which of ``roles`` a label names ('blade and neck': head, neck); a word that fits several roles names none."""
     known, named = list(roles), []
     for word in re.findall(r"[a-z]+", label.lower()):
@@ -80,14 +80,14 @@ def part_name(role: str, prior: Prior, labels_there: Iterable[str], shown: Itera
     roles found on the object: a shaft includes an end that is not a part of its own, and both ends of a rolling pin are
     handles.
     """
-    usual = _usual(role, prior, set(shown))
+    usual = _usual_part_label(role, prior, set(shown))
     said = [" ".join(label.lower().split()) for label in labels_there]
     if usual in said:
         return usual
     return next((label for label in said if _WORDS[role] & set(label.split())), usual)
 
 
-def _usual(role: str, prior: Prior, shown: set[str]) -> str:
+def _usual_part_label(role: str, prior: Prior, shown: set[str]) -> str:
     """Return the prior's label of a part, or its role if the prior has no label of the whole part."""
     by_feature = {part.feature: part.label for part in reversed(prior.functional)}
     features = _FEATURES.get(role, ())
@@ -97,6 +97,6 @@ def _usual(role: str, prior: Prior, shown: set[str]) -> str:
         features += ("handle_end",)
     labels = [by_feature[feature] for feature in features if feature in by_feature]
     if role == "end" and "shaft" in shown:
-        labels = [label for label in labels if label != _usual("shaft", prior, shown)]
+        labels = [label for label in labels if label != _usual_part_label("shaft", prior, shown)]
     usual = next(iter(labels), role)
     return usual if _WORDS[role] & set(usual.lower().split()) else role  # e.g. finger rings are a place on the handle

@@ -47,12 +47,12 @@ class PhotoLight:
     white: float
     sheen: float
 
-    def own_colors(self, srgb: np.ndarray) -> np.ndarray:
+    def object_colors(self, srgb: np.ndarray) -> np.ndarray:
         """Return the object colours ``(..., 3)`` sRGB in [0, 1] for the colours ``srgb (..., 3)`` of the photo."""
         return np.asarray(linear_to_srgb(np.clip(srgb_to_linear(srgb) / self.white - self.sheen, 0.0, 1.0)))
 
 
-def light_of_photo(rgba: np.ndarray) -> PhotoLight | None:
+def estimate_photo_light(rgba: np.ndarray) -> PhotoLight | None:
     """Return the light of a photo ``(H, W, 4) uint8`` with the object's mask as alpha; None without a pale background.
 
     Pixels with alpha 0 must have the colours of the photo.
@@ -75,9 +75,9 @@ def light_of_photo(rgba: np.ndarray) -> PhotoLight | None:
     return PhotoLight(white, min(MOST_SHEEN, darkest))
 
 
-def light_of_photos(paths: Iterable[Path]) -> PhotoLight | None:
+def estimate_mean_light(paths: Iterable[Path]) -> PhotoLight | None:
     """Return the mean light of matted photos (RGBA) of one object; None if it is unknown for one of them."""
-    lights = [light_of_photo(np.asarray(Image.open(path).convert("RGBA"))) for path in paths]
+    lights = [estimate_photo_light(np.asarray(Image.open(path).convert("RGBA"))) for path in paths]
     told = [light for light in lights if light is not None]
     if not told or len(told) < len(lights):
         return None

@@ -69,21 +69,23 @@ class PointSelection:
 
     def select(self) -> SelectedPoints:
         """Return 2-4 functional and 2-3 grasp points; within each kind every point has its own candidate."""
-        grasp = self._grasps()
-        return SelectedPoints(self._functional(), grasp, spare=self.spares([point.candidate for point in grasp]))
+        grasp = self._choose_grasps()
+        return SelectedPoints(
+            self._choose_functional(), grasp, spare=self.spare_grasps([point.candidate for point in grasp])
+        )
 
-    def spares(self, taken: list[int]) -> tuple[GraspPoint, ...]:
+    def spare_grasps(self, taken: list[int]) -> tuple[GraspPoint, ...]:
         """Return the next best grasp points without the candidates ``taken``: unused places first, then second choices."""
-        weights, taken = self._seen() * self._fit() * self._closeness(), list(taken)
+        weights, taken = self._visibility_weights() * self._opening_weights() * self._lever_weights(), list(taken)
         found: list[GraspPoint] = []
         for part in (*self.prior.grasp, *_generic_grasps()):
-            choice = self._best(part.feature, weights, taken, 0.15 * self.shape.size_m)
+            choice = self._best_candidate(part.feature, weights, taken, 0.15 * self.shape.size_m)
             if choice is not None and len(found) < MOST_SPARES:
                 taken.append(choice.candidate)
                 found.append(self._grasp_point(len(taken) - 1, part, choice))
         return tuple(found)
 
-    def _seen(self) -> np.ndarray:
+    def _visibility_weights(self) -> np.ndarray:
         seen = np.zeros(len(self.request.positions_m), dtype=bool)
         for view in self.request.visible:
             seen[list(view)] = True
@@ -107,7 +109,7 @@ class PointSelection:
         named = [roles.index(role) for role in shown if part_name(role, self.prior, (), shown) == label]
         return np.where(np.isin(self._parts.index[-count:], named) | (not named), 1.0, _ELSEWHERE)
 
-    def _best(
+    def _best_candidate(
         self, feature: Feature, weights: np.ndarray, taken: list[int], spread_m: float, *, through: bool = True
     ) -> _Choice | None:
         """Return the best candidate for a feature, away from those ``taken``, also across thin walls if ``through``."""
@@ -124,7 +126,7 @@ class PointSelection:
         index = int(ranked.argmax())
         return _Choice(index, float(scores[index])) if scores[index] >= _WEAK and ranked[index] > 0 else None
 
-    def _functional(self) -> tuple[FunctionalPoint, ...]:
+    def _choose_functional(self) -> tuple[FunctionalPoint, ...]:
         """Choose functional points: at the prior's parts first, then at generic features, then near the centre of mass."""
         generic = tuple(
             FunctionalPart(label=_PLACES[f], description=f"{_PLACES[f]} of {self._thing}", feature=f)
@@ -136,54 +138,56 @@ class PointSelection:
             least = LEAST if part in generic else MOST_FUNCTIONAL
             if len(found) >= least:
                 continue
-            choice = self._best(part.feature, self._seen(), taken, 0.05 * self.shape.size_m, through=False)
+            choice = self._best_candidate(
+                part.feature, self._visibility_weights(), taken, 0.05 * self.shape.size_m, through=False
+            )
             if choice is not None:
                 taken.append(choice.candidate)
                 found.append(self._functional_point(len(found), part, choice))
-        for index in self._leftover(taken, LEAST - len(found)):
+        for index in self._unused_candidates(taken, LEAST - len(found)):
             part = FunctionalPart(label="surface", description=f"a place on {self._thing}", feature="center")
             found.append(self._functional_point(len(found), part, _Choice(index, _WEAK)))
         return tuple(found)
 
-    def _grasps(self) -> tuple[GraspPoint, ...]:
+    def _choose_grasps(self) -> tuple[GraspPoint, ...]:
         """Choose grasp points: at the prior's parts first, then at generic features, on opposite sides, near the centre."""
         generic = _generic_grasps()
-        weights = self._seen() * self._fit() * self._closeness()
+        weights = self._visibility_weights() * self._opening_weights() * self._lever_weights()
         found: list[GraspPoint] = []
         taken: list[int] = []
         sides: list[tuple[GraspPart, int]] = []
         for part in (*self.prior.grasp, *generic):
             if len(found) >= (LEAST if part in generic else MOST_GRASPS):
                 continue
-            choice = self._best(part.feature, weights, taken, 0.15 * self.shape.size_m)
+            choice = self._best_candidate(part.feature, weights, taken, 0.15 * self.shape.size_m)
             if choice is not None:
                 taken.append(choice.candidate)
                 found.append(self._grasp_point(len(found), part, choice))
                 sides += [(part, choice.candidate)] if part.feature == "side" else []
         for part, index in sides[: MOST_GRASPS - len(found)]:
-            other = self._best("side", weights * self._facing_away(index), taken, 0.0)
+            other = self._best_candidate("side", weights * self._opposed_weights(index), taken, 0.0)
             if other is not None:  # the approach may have to come from the other side
                 taken.append(other.candidate)
                 part = part.model_copy(update={"scenario": f"{part.scenario}, from the other side"})
                 found.append(self._grasp_point(len(found), part, other))
-        for index in self._leftover(taken, LEAST - len(found)):
+        for index in self._unused_candidates(taken, LEAST - len(found)):
             part = GraspPart(type="parallel_jaw", scenario="pick up near the centre of mass", feature="center")
             found.append(self._grasp_point(len(found), part, _Choice(index, _WEAK)))
         return tuple(found)
 
-    def _fit(self) -> np.ndarray:
+    def _opening_weights(self) -> np.ndarray:
         """Weight candidates by whether the gripper opens wide enough for the thickness behind them."""
         room = self.request.max_opening_m - _FINGER_CLEARANCE_M
         return np.where(self.points.thickness_m <= room, 1.0, 0.2 * room / np.maximum(self.points.thickness_m, room))
 
-    def _facing_away(self, index: int) -> np.ndarray:
+    def _opposed_weights(self, index: int) -> np.ndarray:
         """Weight candidates by how much they face the opposite way, from 1 down to 0 at right angles."""
         return np.clip(-self.request.normals @ self.request.normals[index], 0.0, 1.0)
 
-    def _closeness(self) -> np.ndarray:
+    def _lever_weights(self) -> np.ndarray:
         return 0.4 + 0.6 / (1 + (self.lever_m / _LEVER_M) ** 2)
 
-    def _leftover(self, taken: list[int], count: int) -> list[int]:
+    def _unused_candidates(self, taken: list[int], count: int) -> list[int]:
         """Return the unused candidates nearest to the centre of mass."""
         return [int(i) for i in np.argsort(self.lever_m, kind="stable") if int(i) not in taken][: max(count, 0)]
 
@@ -205,7 +209,7 @@ class PointSelection:
             **self.request.place(i),
             type=self._type(part, i),
             scenario=part.scenario,
-            confidence=self._confidence(choice.score * float(self._fit()[i])),
+            confidence=self._confidence(choice.score * float(self._opening_weights()[i])),
             rationale=self._rationale(part.feature, i) + self._width_remark(i),
         )
 
@@ -219,11 +223,10 @@ class PointSelection:
         return round((0.3 + 0.6 * score) * (1.0 if self.named else 0.55), 3)
 
     def _rationale(self, feature: Feature, i: int) -> str:
-        return (
-            f"{_PLACES[feature]}{self._measured(feature, i)}, {1000 * self.lever_m[i]:.0f} mm from the centre of mass"
-        )
+        lever_mm = 1000 * self.lever_m[i]
+        return f"{_PLACES[feature]}{self._measurement_phrase(feature, i)}, {lever_mm:.0f} mm from the centre of mass"
 
-    def _measured(self, feature: Feature, i: int) -> str:
+    def _measurement_phrase(self, feature: Feature, i: int) -> str:
         """Return the measurement that supports a choice, as part of its rationale."""
         shape, height = self.shape, 1000 * self.request.positions_m[i, 2]
         if feature in ("opening", "rim", "inside") and shape.opening is not None:
@@ -292,7 +295,7 @@ def _generic_grasps() -> tuple[GraspPart, ...]:
 
 def spare_grasp_points(request: PointsRequest, taken: list[int]) -> tuple[GraspPoint, ...]:
     """Return grasp points from geometry alone, best first, at none of the candidates ``taken``."""
-    return PointSelection(request, None).spares(taken)
+    return PointSelection(request, None).spare_grasps(taken)
 
 
 def select_points(request: PointsRequest, prior: Prior | None) -> SelectedPoints:

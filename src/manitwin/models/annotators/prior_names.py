@@ -8,19 +8,19 @@ from functools import cache
 from itertools import combinations
 
 from manitwin.errors import ManiTwinError
-from manitwin.models.annotators.diacritics import without_diacritics
-from manitwin.models.annotators.names_abroad import category_abroad
+from manitwin.models.annotators.diacritics import remove_diacritics
+from manitwin.models.annotators.foreign_names import category_of_foreign_name
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
-from manitwin.models.generators.templates.looks import COLORS, MATERIALS, SAID_OF, SHADES
+from manitwin.models.generators.templates.looks import COLORS, MATERIAL_WORDING, MATERIALS, SHADES
 
 _BETWEEN_WORDS = r"(?:[^a-z0-9&+'.]|\.(?!\d)|(?<!\d)\.)+"
 """Word separators; a point between two digits is part of a number: 1.5 cm."""
 
 
-def normalised(name: str) -> str:
+def normalise_name(name: str) -> str:
     """Return a name in lower case without diacritics, punctuation, a leading article, or text after a comma or bracket."""
-    head = re.split(r"[,(\[;:]", without_diacritics(name), maxsplit=1)[0]
+    head = re.split(r"[,(\[;:]", remove_diacritics(name), maxsplit=1)[0]
     words = re.sub(_BETWEEN_WORDS, " ", head.replace("’", "'").replace("'s ", " ").replace("'", "")).split()
     return " ".join(words[1:] if words[:1] in (["a"], ["an"], ["the"]) and len(words) > 1 else words)
 
@@ -38,7 +38,7 @@ def _index() -> dict[str, Prior]:
     index: dict[str, Prior] = {}
     for prior in load_priors().values():
         for name in (prior.category, *prior.aliases):
-            key = normalised(name)
+            key = normalise_name(name)
             if key in index:
                 raise ManiTwinError(f"priors: {name!r} names both {index[key].category!r} and {prior.category!r}")
             index[key] = prior
@@ -46,7 +46,7 @@ def _index() -> dict[str, Prior]:
 
 
 @cache
-def _written_together() -> dict[str, str]:
+def _compound_index() -> dict[str, str]:
     """Return the index names by their letters without spaces, except for those shared by more than one prior."""
     index = _index()
     found: dict[str, set[str]] = {}
@@ -60,16 +60,16 @@ def _written_together() -> dict[str, str]:
 def named(name: str) -> Prior | None:
     """Return the prior whose category or alias is this name, in the singular or plural; else None."""
     index = _index()
-    return next((index[phrase] for phrase in singulars(normalised(name)) if phrase in index), None)
+    return next((index[phrase] for phrase in singulars(normalise_name(name)) if phrase in index), None)
 
 
-def named_together(name: str) -> Prior | None:
+def prior_by_compound(name: str) -> Prior | None:
     """Return the prior of a name written as one word instead of two (a doorknob), or None."""
-    together = _written_together()
-    return next((named(together[each]) for each in singulars(normalised(name)) if each in together), None)
+    together = _compound_index()
+    return next((named(together[each]) for each in singulars(normalise_name(name)) if each in together), None)
 
 
-def lookup(name: str | None) -> Prior | None:
+def find_prior(name: str | None) -> Prior | None:
     """Find the prior of an everyday name; None if the table has none (``found_by``)."""
     found = found_by(name)
     return None if found is None else found[0]
@@ -97,7 +97,7 @@ _ALONE = frozenset({"cap", "handle", "holder", "roller"})
 """Nouns that name a thing where they stand alone, or with words for its look: with another noun they are a part of that thing,
 or made for it (the cap of a pen or a chair's leg, the holder of a cable), of any size, and no hat and no container."""
 _OF_ITS_LOOK = frozenset(
-    word for said in (*COLORS, *SHADES, *MATERIALS, *SAID_OF, "metal", "wool") for word in said.split()
+    word for said in (*COLORS, *SHADES, *MATERIALS, *MATERIAL_WORDING, "metal", "wool") for word in said.split()
 )
 _SAYS_LITTLE = frozenset(
     {
@@ -110,7 +110,7 @@ _JOINED = r" (?:made |full )?(of|with|for|in|on|without|no|from) "
 """What divides a name into the noun with what stands before it, and what is said of that."""
 
 
-def _is_of_another(phrase: str, noun: str) -> bool:
+def _is_component_name(phrase: str, noun: str) -> bool:
     """Tell whether a name with a noun of ``_ALONE`` says what else it is of: a 'red bottle cap', the 'handle of a drawer'."""
     if noun not in _ALONE:
         return False
@@ -136,30 +136,30 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
     version of anything is a toy, as is a doll's chair. File names are never looked up, since they are not evidence. A name
     without an English match is looked up as a whole in other languages.
     """
-    return (_found_in_english(name) or _found_abroad(name)) if name else None
+    return (_find_english(name) or _find_foreign(name)) if name else None
 
 
-def _found_abroad(name: str) -> tuple[Prior, str] | None:
-    category = category_abroad(name)
-    return None if category is None else (_index()[normalised(category)], normalised(category))
+def _find_foreign(name: str) -> tuple[Prior, str] | None:
+    category = category_of_foreign_name(name)
+    return None if category is None else (_index()[normalise_name(category)], normalise_name(category))
 
 
-def _found_in_english(name: str) -> tuple[Prior, str] | None:
+def _find_english(name: str) -> tuple[Prior, str] | None:
     """Return the prior of an English name, with the attempts in the order that ``found_by`` describes."""
-    if not (phrase := normalised(name)):
+    if not (phrase := normalise_name(name)):
         return None
     head = re.split(_JOINED, phrase, maxsplit=1)[0].split()
     words = phrase.split()
-    tries = [words, *(head[i:] for i in range(len(head) - 1)), *_words_dropped(head), head[-1:]]
+    tries = [words, *(head[i:] for i in range(len(head) - 1)), *_shortened_names(head), head[-1:]]
     tries += [words[i:] for i in range(1, len(words))]
     while head and _NO_THING.fullmatch(head[-1]):
         head = head[:-1]
         tries += [head[i:] for i in range(len(head))]
-    index, together = _index(), _written_together()
+    index, together = _index(), _compound_index()
     for part in tries:
         spelt = list(singulars(" ".join(part)))
         for candidate in (*spelt, *(together.get(each.replace(" ", ""), "") for each in spelt)):
-            if of_another := _is_of_another(phrase, candidate):
+            if of_another := _is_component_name(phrase, candidate):
                 break
             if candidate in index and index[candidate].category != "unknown":
                 small = index[candidate].domain == _TOO_LARGE and not _SMALL.isdisjoint(head[:-1])
@@ -183,7 +183,7 @@ def names_with(name: str) -> list[str]:
 
     For 'beer' these are beer bottle, beer can and others, for 'gear part' gear.
     """
-    words = normalised(name).split()
+    words = normalise_name(name).split()
     while words and (words[-1] in _OF_A_THING or _NO_THING.fullmatch(words[-1])):
         words.pop()
     last = set(singulars(words[-1])) if words else set()
@@ -191,7 +191,7 @@ def names_with(name: str) -> list[str]:
     return sorted(found, key=lambda key: (len(key.split()), key))
 
 
-def _words_dropped(head: list[str]) -> Iterator[list[str]]:
+def _shortened_names(head: list[str]) -> Iterator[list[str]]:
     """Yield a name with inner words dropped; the last word stays, and the variants with the most words come first."""
     *before, noun = head
     if len(before) > _MOST_WORDS_BEFORE:
@@ -201,23 +201,23 @@ def _words_dropped(head: list[str]) -> Iterator[list[str]]:
             yield [*(before[place] for place in places), noun]
 
 
-def word_for(prior: Prior, said: str) -> str:
+def object_noun(prior: Prior, said: str) -> str:
     """Return the noun for an object that was found by these words: a 'coffee mug' is a mug, a 'pan' is not a frying pan.
 
     Packages and varieties get their full name if the words do not contain it: 'ketchup' is a ketchup bottle, a 'granny smith'
     a granny smith apple.
     """
-    words, category = said.split(), normalised(prior.category).split()
+    words, category = said.split(), normalise_name(prior.category).split()
     if words[-len(category) :] == category:
         return prior.category
     whole = [name for name in (prior.category, *prior.aliases) if " of " not in name]
-    packed = next((name for name in whole if normalised(name).startswith(f"{said} ")), None)
+    packed = next((name for name in whole if normalise_name(name).startswith(f"{said} ")), None)
     if packed is not None:
         return packed
     # keeps the spelling, e.g. of a cook's knife
-    return next((alias for alias in prior.aliases if normalised(alias) == said), said)
+    return next((alias for alias in prior.aliases if normalise_name(alias) == said), said)
 
 
-def counter_of(prior: Prior, noun: str) -> str | None:
+def counter_phrase(prior: Prior, noun: str) -> str | None:
     """Return the counter of a prior ('bar of' for soap), None if the noun already contains it: a soap bar."""
     return None if prior.counter is None or prior.counter.split()[0] in noun.split() else prior.counter

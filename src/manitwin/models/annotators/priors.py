@@ -11,7 +11,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from manitwin.errors import ManiTwinError, choose_from
+from manitwin.errors import ManiTwinError, unknown_name_message
 from manitwin.formats.toml_file import parse_toml
 from manitwin.models.annotators.prior_records import Material, Prior
 
@@ -36,23 +36,29 @@ def load_materials() -> dict[str, Material]:
     return {name: Material.model_validate(row) for name, row in _read("materials").items()}
 
 
-def _worded(parts: list[dict[str, Any]], category: str) -> list[dict[str, Any]]:
+def _insert_category(parts: list[dict[str, Any]], category: str) -> list[dict[str, Any]]:
     """Insert the category's name into the wording of a form."""
     return [{key: value.replace("{object}", category) for key, value in part.items()} for part in parts]
 
 
-def _prior(category: str, row: dict[str, Any], domain: str, defaults: dict[str, Any], forms: dict[str, Any]) -> Prior:
+def _build_prior(
+    category: str, row: dict[str, Any], domain: str, defaults: dict[str, Any], forms: dict[str, Any]
+) -> Prior:
     """Build a prior from its row, the domain's defaults and its form; raises ManiTwinError for unknown names in the row."""
     materials = load_materials()
     row = {**defaults, **row}
     form_name, surface = row.pop("form"), row.pop("surface")
     if form_name not in forms:
-        raise ManiTwinError(f"{domain}.toml [{category}]: {choose_from('form', form_name, forms)}")
+        raise ManiTwinError(f"{domain}.toml [{category}]: {unknown_name_message('form', form_name, forms)}")
     for material in row.get("part_materials", {}).values():
         if material not in materials:
-            raise ManiTwinError(f"{domain}.toml [{category}]: {choose_from('part material', material, materials)}")
+            raise ManiTwinError(
+                f"{domain}.toml [{category}]: {unknown_name_message('part material', material, materials)}"
+            )
     if surface not in materials:
-        raise ManiTwinError(f"{domain}.toml [{category}]: {choose_from('surface material', surface, materials)}")
+        raise ManiTwinError(
+            f"{domain}.toml [{category}]: {unknown_name_message('surface material', surface, materials)}"
+        )
     contact = materials[surface]
     merged = {
         "aliases": [], "measured": [], "bulk_density_kg_m3": None, "material": surface,
@@ -66,10 +72,13 @@ def _prior(category: str, row: dict[str, Any], domain: str, defaults: dict[str, 
         form = merged.pop(key, None)
         if form is not None and (not own or row.get("parts") == forms[form_name]["parts"]):
             places = [own.get(place["label"], place) for place in forms[form]["functional"]]
-            told = {"functional": _worded(places, category), "grasp": _worded(forms[form]["grasp"], category)}
+            told = {
+                "functional": _insert_category(places, category),
+                "grasp": _insert_category(forms[form]["grasp"], category),
+            }
             merged[key] = {"parts": forms[form]["parts"], **told}
     for key in ("functional", "grasp"):
-        merged[key] = _worded(merged[key], category)
+        merged[key] = _insert_category(merged[key], category)
     return Prior.model_validate({**merged, "category": category, "domain": domain, "surface": surface})
 
 
@@ -87,7 +96,7 @@ def load_priors() -> dict[str, Prior]:
             for name, each in rows.items():
                 if name in priors:
                     raise ManiTwinError(f"{domain}.toml [{name}]: is already in {priors[name].domain}.toml")
-                priors[name] = _prior(name, each, domain, defaults, forms)
+                priors[name] = _build_prior(name, each, domain, defaults, forms)
     return priors
 
 

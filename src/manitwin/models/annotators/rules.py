@@ -7,10 +7,11 @@ import trimesh
 
 from manitwin.config import Resource
 from manitwin.geometry.boxes import upright_extents
+from manitwin.models.annotators.descriptions import describe
 from manitwin.models.annotators.leaves import volume_with_leaves_m3
-from manitwin.models.annotators.likely_names import usual_of
+from manitwin.models.annotators.likely_names import usual_values
 from manitwin.models.annotators.point_rules import select_points
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.prior_records import DEVIATIONS_ACROSS, Interval, Prior
 from manitwin.models.annotators.priors import unknown_prior
 from manitwin.models.annotators.protocol import (
@@ -21,9 +22,8 @@ from manitwin.models.annotators.protocol import (
     SelectedPoints,
     Subject,
 )
-from manitwin.models.annotators.stated_matter import look_of_words, prior_as_named, prior_of
+from manitwin.models.annotators.stated_matter import look_from_words, prior_in_material, prior_in_named_material
 from manitwin.models.annotators.walls import density_as_stated, density_by_wall, is_outer_skin, median_thickness
-from manitwin.models.annotators.words import describe
 from manitwin.models.generators.templates.looks import MATERIALS
 from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
@@ -66,15 +66,15 @@ class RulesAnnotator:
 
     def select_points(self, request: PointsRequest) -> SelectedPoints:
         """Choose functional and grasp points: the prior's parts, located by geometric features."""
-        return select_points(request, lookup(request.subject.name))
+        return select_points(request, find_prior(request.subject.name))
 
 
 def prior_of_subject(subject: Subject) -> Prior | None:
     """Return the prior of the object's name, in the material stated by the name or used by the template that built it."""
     given = subject.given
-    look = look_of_words(given.material) if given is not None and given.made_of_parts else None
-    prior = lookup(subject.name)
-    return prior_as_named(subject.name) if prior is None or look is None else prior_of(prior, look)
+    look = look_from_words(given.material) if given is not None and given.has_part_masses else None
+    prior = find_prior(subject.name)
+    return prior_in_named_material(subject.name) if prior is None or look is None else prior_in_material(prior, look)
 
 
 def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimates:
@@ -82,7 +82,7 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
     density: Estimate | None
     bulk: Interval | None = None
     if prior is None:
-        usual, prior = usual_of(subject.likely), unknown_prior()
+        usual, prior = usual_values(subject.likely), unknown_prior()
         size, density = usual.longest_axis_m, usual.bulk_density_kg_m3
     else:
         size = prior.longest_axis_m.estimate(prior.source)
@@ -96,7 +96,7 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
         longest_axis_m=None if subject.metric else size,
         mass_kg=_unknown_mass(density, volume_m3)
         if prior.category == "unknown"
-        else _mass(
+        else _combined_mass(
             prior,
             bulk,
             longest_m,
@@ -126,7 +126,7 @@ def density_of_wall(prior: Prior, subject: Subject) -> Interval | None:
     return density_as_stated(prior, MATERIALS[prior.stated].density_kg_m3, subject.solid, subject.seed)
 
 
-def _mass(
+def _combined_mass(
     prior: Prior, bulk: Interval | None, longest_m: float, volume_m3: float, size_spread: float, full: bool
 ) -> Estimate:
     """Combine the usual mass at this size with ``bulk`` density times volume, weighted by their precision.
@@ -138,10 +138,10 @@ def _mass(
     mass of a full vessel; the lower halves of the intervals, which come from partly filled vessels, are ignored for the
     weights.
     """
-    by_size = _scaled(prior.mass_kg, (longest_m / prior.longest_axis_m.typical) ** _SIZE_EXPONENT)
+    by_size = _scale_interval(prior.mass_kg, (longest_m / prior.longest_axis_m.typical) ** _SIZE_EXPONENT)
     if bulk is None:
-        return _clamped(by_size.typical, by_size, prior.mass_kg, prior.source)
-    by_volume = _scaled(bulk, volume_m3)
+        return _clamp_estimate(by_size.typical, by_size, prior.mass_kg, prior.source)
+    by_volume = _scale_interval(bulk, volume_m3)
     spread_at_size, spread_at_volume = (i.upper_log_spread if full else i.log_spread for i in (by_size, by_volume))
     weight_size = (_SAME_SIZE_SPREAD * spread_at_size) ** -2
     weight_volume = 1 / (spread_at_volume**2 + (3 * size_spread) ** 2)
@@ -153,7 +153,7 @@ def _mass(
     )
     open_to = Interval(low=min(by_volume.low, value / beyond), typical=value, high=max(by_volume.high, value * beyond))
     possible = min(max(value, by_volume.low), by_volume.high) if size_spread else value
-    return _clamped(possible, open_to, prior.mass_kg, source if possible == value else "density*volume")
+    return _clamp_estimate(possible, open_to, prior.mass_kg, source if possible == value else "density*volume")
 
 
 def _mass_spread(spread_at_size: float, spread_at_volume: float, size_spread: float) -> float:
@@ -173,11 +173,11 @@ def _unknown_mass(density_kg_m3: Estimate | None, volume_m3: float) -> Estimate:
     return Estimate(value=value, low=low, high=high, source=density_kg_m3.source)
 
 
-def _scaled(interval: Interval, factor: float) -> Interval:
+def _scale_interval(interval: Interval, factor: float) -> Interval:
     return Interval(low=interval.low * factor, typical=interval.typical * factor, high=interval.high * factor)
 
 
-def _clamped(value: float, open_to: Interval, category: Interval, source: str) -> Estimate:
+def _clamp_estimate(value: float, open_to: Interval, category: Interval, source: str) -> Estimate:
     """Clamp ``value`` to the category's interval, and its interval to the overlap of ``open_to`` and the category's.
 
     If the value is moved, size and volume are unusual for the category; the interval then includes both the typical mass and

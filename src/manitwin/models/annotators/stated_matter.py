@@ -14,13 +14,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.diacritics import without_diacritics
+from manitwin.models.annotators.diacritics import remove_diacritics
 from manitwin.models.annotators.prior_names import found_by, singulars
 from manitwin.models.annotators.prior_records import Interval, Prior
 from manitwin.models.annotators.priors import load_materials
-from manitwin.models.generators.templates.described import materials_said
-from manitwin.models.generators.templates.looks import MATERIALS, SAID_OF, Look
-from manitwin.models.generators.templates.matter import is_composite, is_food, looks_in, surfaces_of
+from manitwin.models.generators.templates.look_phrases import stated_materials
+from manitwin.models.generators.templates.looks import MATERIAL_WORDING, MATERIALS, Look
+from manitwin.models.generators.templates.matter import is_composite, is_food, looks_of_materials, surfaces_of
 
 USUAL_WALL_M = 0.003
 """Wall thickness of open containers in materials that list none: silicone, cardboard, leather."""
@@ -31,27 +31,27 @@ IMITATION = (0.08, 0.4, 1.0)
 _LIGHTEST_KG_M3 = 10.0
 
 
-def prior_as_named(name: str | None) -> Prior | None:
+def prior_in_named_material(name: str | None) -> Prior | None:
     """Return the prior of an everyday name in the material that the name states; None if the name is unknown."""
     found = found_by(name)
     if found is None or name is None:
         return None
     prior, called = found
-    look = _look_in(name, called, prior)
-    return prior if look is None else prior_of(prior, look)
+    look = _stated_look(name, called, prior)
+    return prior if look is None else prior_in_material(prior, look)
 
 
-def prior_of(prior: Prior, look: Look) -> Prior:
+def prior_in_material(prior: Prior, look: Look) -> Prior:
     """Return a prior in another material than usual; the prior itself if the material is the usual one.
 
     If such objects have parts of different materials, the first part, an unknown share of the mass, gets the new material.
     """
-    said = SAID_OF.get(look.material, look.material)
+    said = MATERIAL_WORDING.get(look.material, look.material)
     if is_composite(prior):
-        return prior if look.surface in surfaces_of(prior) else _with_one_part_of(prior, look, said)
+        return prior if look.surface in surfaces_of(prior) else _with_part_material(prior, look, said)
     if prior.material == said:
         return prior
-    mass_by, bulk = _weighed(prior, look)
+    mass_by, bulk = _mass_factors(prior, look)
     contact = load_materials()[look.surface]
     return prior.model_copy(
         update={
@@ -68,18 +68,18 @@ def prior_of(prior: Prior, look: Look) -> Prior:
     )
 
 
-def look_of_words(material: str | None) -> Look | None:
+def look_from_words(material: str | None) -> Look | None:
     """Return the look for a twin's material in words; None for several materials or an unknown one."""
     if material is None:
         return None
-    of_words = {said: name for name, said in SAID_OF.items()}
+    of_words = {said: name for name, said in MATERIAL_WORDING.items()}
     return MATERIALS.get(of_words.get(material, material))
 
 
-def _look_in(name: str, called: str, prior: Prior) -> Look | None:
+def _stated_look(name: str, called: str, prior: Prior) -> Look | None:
     """Return the material that a name states before, within or after the words for the object; None for none or several."""
     words = re.sub(
-        r"[^a-z0-9,]+", " ", without_diacritics(name).replace("\u2019", "").replace("'", "").replace(",", " , ")
+        r"[^a-z0-9,]+", " ", remove_diacritics(name).replace("\u2019", "").replace("'", "").replace(",", " , ")
     ).split()
     length = len(called.split())
     begins = [at for at in range(len(words)) if called in singulars(" ".join(words[at : at + length]))]
@@ -87,15 +87,15 @@ def _look_in(name: str, called: str, prior: Prior) -> Look | None:
         return None
     begin, end = begins[0], begins[0] + length
     try:
-        said = materials_said(words[:begin], words[begin:end], words[end:], prior)
+        said = stated_materials(words[:begin], words[begin:end], words[end:], prior)
     except UsageError:
         return None  # ambiguous, e.g. steel and wood
     return said[0] if len(set(said)) == 1 else None
 
 
-def _weighed(prior: Prior, look: Look) -> tuple[tuple[float, float, float], Interval | None]:
+def _mass_factors(prior: Prior, look: Look) -> tuple[tuple[float, float, float], Interval | None]:
     """Return the factors (low, typical, high) on the mass at a given size, and the bulk density."""
-    usual, bulk = looks_in(prior.material), prior.bulk_density_kg_m3
+    usual, bulk = looks_of_materials(prior.material), prior.bulk_density_kg_m3
     if is_food(prior) and bulk is not None:
         low, typical, high = (share * look.density_kg_m3 for share in IMITATION)
         return (low / bulk.low, typical / bulk.typical, high / bulk.high), Interval(low=low, typical=typical, high=high)
@@ -104,26 +104,26 @@ def _weighed(prior: Prior, look: Look) -> tuple[tuple[float, float, float], Inte
     density = float(np.exp(np.mean([np.log(each.density_kg_m3) for each in usual])))
     wall_m = float(np.exp(np.mean([np.log(_wall_m(each)) for each in usual])))
     heavier, areal = look.density_kg_m3 / density, look.density_kg_m3 * _wall_m(look) / (density * wall_m)
-    if _holds(prior, density):
+    if _is_contents_dominated(prior, density):
         if bulk is None:
             return (1.0, 1.0, 1.0), None
         low = max(bulk.low * areal, min(bulk.low, _LIGHTEST_KG_M3))
         held = Interval(low=low, typical=bulk.typical + low - bulk.low, high=bulk.high + low - bulk.low)
         return (low / bulk.low, held.typical / bulk.typical, held.high / bulk.high), held
-    swollen = None if bulk is None else _as_swollen(bulk, density, look, wall_m)
+    swollen = None if bulk is None else _scan_bulk_density(bulk, density, look, wall_m)
     if prior.container:
         return (areal, areal, areal), swollen
     return (min(areal, heavier), float(np.sqrt(areal * heavier)), max(areal, heavier)), swollen
 
 
-def _holds(prior: Prior, density_kg_m3: float) -> bool:
+def _is_contents_dominated(prior: Prior, density_kg_m3: float) -> bool:
     """Tell whether the mass of such objects comes mostly from their contents instead of their material."""
     bulk = prior.bulk_density_kg_m3
     light = bulk is not None and bulk.typical < OF_ONE_MATTER * density_kg_m3
     return prior.vessel or (prior.mass_distribution == "full" and light)
 
 
-def _as_swollen(bulk: Interval, density_kg_m3: float, look: Look, wall_m: float) -> Interval:
+def _scan_bulk_density(bulk: Interval, density_kg_m3: float, look: Look, wall_m: float) -> Interval:
     """Return the bulk density of scans in another material; a scan thickens thick walls relatively less."""
     ends = []
     for value in (bulk.low, bulk.typical, bulk.high):
@@ -134,9 +134,9 @@ def _as_swollen(bulk: Interval, density_kg_m3: float, look: Look, wall_m: float)
     return Interval(low=float(low), typical=float(typical), high=float(high))
 
 
-def _with_one_part_of(prior: Prior, look: Look, said: str) -> Prior:
+def _with_part_material(prior: Prior, look: Look, said: str) -> Prior:
     """Return a prior of objects with parts of different materials, with another material for the first one."""
-    first = looks_in(re.split(r" and | with ", prior.material)[0])
+    first = looks_of_materials(re.split(r" and | with ", prior.material)[0])
     if not first or first[0].surface != prior.surface:
         return prior
     rest = re.split(r"(?= and | with )", prior.material, maxsplit=1)[1]

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 from manitwin.formats.meshes.textures import linear_to_srgb, material_of, uv_of
-from manitwin.geometry.openness import open_share
+from manitwin.geometry.openness import unoccluded_share
 from manitwin.geometry.sampling import sample_surface
 
 # (name, sRGB hex). Several shades share a name. Names and regions follow the ISCC-NBS centroid colours (Kelly and Judd 1955,
@@ -117,7 +117,7 @@ def color_name(lab: np.ndarray, *, metallic: bool = True, metal_in_a_photo: bool
     return "dark yellow" if hue_rad > _YELLOW_HUE_RAD else "orange"
 
 
-def are_near(name: str, other: str) -> bool:
+def are_similar_colors(name: str, other: str) -> bool:
     """Tell whether two colour names are of one family, or have shades that are close in CIELAB."""
     if _family(name) == _family(other):
         return True
@@ -162,18 +162,18 @@ def measure_colors(
     samples = [_base_colors(part, count, rng) for part, count in zip(colored, counts, strict=True)]
     colors, points, normals = (np.vstack(each) for each in zip(*samples, strict=True))
     colors = colors if own_colors is None else own_colors(colors)
-    seen = seen_from_outside(_joined(parts), points, normals)
+    seen = is_visible_outside(_concatenate_meshes(parts), points, normals)
     metallic = any(float(material_of(part).metallicFactor or 0.0) > _METALLIC for part in colored)
-    return named_colors(lab_from_srgb(colors[seen]), metallic, metal_in_a_photo=metal_in_a_photo)
+    return name_colors(lab_from_srgb(colors[seen]), metallic, metal_in_a_photo=metal_in_a_photo)
 
 
-def seen_from_outside(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def is_visible_outside(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Return a mask (N,) of the surface points ``(N, 3)`` that are well visible from outside; all True if hardly any are."""
-    seen = open_share(mesh, points, normals) >= _LEAST_OPEN
+    seen = unoccluded_share(mesh, points, normals) >= _LEAST_OPEN
     return seen if seen.mean() >= _LEAST_SEEN else np.ones(len(points), dtype=bool)
 
 
-def _joined(parts: tuple[trimesh.Trimesh, ...]) -> trimesh.Trimesh:
+def _concatenate_meshes(parts: tuple[trimesh.Trimesh, ...]) -> trimesh.Trimesh:
     vertices, faces = trimesh.util.append_faces([part.vertices for part in parts], [part.faces for part in parts])
     return trimesh.Trimesh(vertices, faces, process=False)
 
@@ -213,22 +213,22 @@ def base_colors_at(part: trimesh.Trimesh, faces: np.ndarray, points: np.ndarray)
     return np.clip(linear_to_srgb(linear * factor), 0, 1)
 
 
-def named_colors(lab: np.ndarray, metallic: bool, *, metal_in_a_photo: bool = False) -> list[ColorShare]:
+def name_colors(lab: np.ndarray, metallic: bool, *, metal_in_a_photo: bool = False) -> list[ColorShare]:
     """Return up to three named colours of observed surface colours ``(N, 3)`` in CIELAB, in the order in which people name them.
 
     Colours that one material may have under different light are merged, because the texture of a scan contains the light of
     its capture.
     """
-    centers, labels = _merged(*_k_means(lab))
+    centers, labels = _merge_clusters(*_k_means(lab))
     shares: dict[str, float] = {}
     for index in range(len(centers)):
         name = color_name(np.median(lab[labels == index], axis=0), metallic=metallic, metal_in_a_photo=metal_in_a_photo)
         shares[name] = shares.get(name, 0.0) + float((labels == index).mean())
-    ranked = _ranked(_by_family(shares))
+    ranked = _rank_colors(_merge_families(shares))
     return [ranked[0], *(c for c in ranked[1:_MOST_NAMES] if c.share >= _LEAST_SHARE)]
 
 
-def _by_family(shares: dict[str, float]) -> dict[str, float]:
+def _merge_families(shares: dict[str, float]) -> dict[str, float]:
     """Join shades of one family under the name of its dominant shade; a single shade keeps its name."""
     members: dict[str, list[str]] = {}
     for name in shares:
@@ -240,7 +240,7 @@ def _by_family(shares: dict[str, float]) -> dict[str, float]:
     return joined
 
 
-def _ranked(shares: dict[str, float]) -> list[ColorShare]:
+def _rank_colors(shares: dict[str, float]) -> list[ColorShare]:
     neutral = max((share for name, share in shares.items() if name in _NEUTRAL), default=0.0)
     telling = {n for n, share in shares.items() if n not in _NEUTRAL and share >= max(_LEAST_SHARE, _TELLING * neutral)}
     order = sorted(shares, key=lambda name: (name not in telling, -shares[name], name))
@@ -250,19 +250,19 @@ def _ranked(shares: dict[str, float]) -> list[ColorShare]:
 def _k_means(lab: np.ndarray, rounds: int = 15) -> tuple[np.ndarray, np.ndarray]:
     """Cluster colours ``(N, 3)`` with Lloyd's k-means from farthest-point starts, which is deterministic."""
     centers = [np.median(lab, axis=0)]
-    distance = _apart(lab, centers[0])
+    distance = _material_distance(lab, centers[0])
     while len(centers) < _CLUSTERS and distance.max() > _SAME_COLOR / 2:
         centers.append(lab[int(distance.argmax())])
-        distance = np.minimum(distance, _apart(lab, centers[-1]))
+        distance = np.minimum(distance, _material_distance(lab, centers[-1]))
     middle = np.array(centers)
     for _ in range(rounds):
-        labels = _apart(lab[:, None], middle).argmin(1)
+        labels = _material_distance(lab[:, None], middle).argmin(1)
         middle = np.array([lab[labels == i].mean(0) if (labels == i).any() else middle[i] for i in range(len(middle))])
-    labels = _apart(lab[:, None], middle).argmin(1)
+    labels = _material_distance(lab[:, None], middle).argmin(1)
     return middle, labels
 
 
-def _apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _material_distance(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the distance of colours ``(..., 3)`` from being one material's under different light.
 
     Light scales XYZ, and thereby a* and b* in proportion to L* + 16 (CIE 15:2004, 8.2.1): both colours are compared as under
@@ -274,13 +274,13 @@ def _apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.asarray(np.sqrt((tint**2).sum(-1) + (_LIGHTNESS * (light_one - light_other)[..., 0]) ** 2))
 
 
-def _merged(centers: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _merge_clusters(centers: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Merge clusters that are shades of one colour, nearest pair first; drop empty ones."""
     sizes = np.bincount(labels, minlength=len(centers)).astype(float)
     groups = [[i] for i in range(len(centers)) if sizes[i]]
     means = [centers[g[0]] for g in groups]
     while len(groups) > 1:
-        gap = _apart(np.array(means)[:, None], np.array(means)) + 1e9 * np.eye(len(means))
+        gap = _material_distance(np.array(means)[:, None], np.array(means)) + 1e9 * np.eye(len(means))
         a, b = sorted(int(i) for i in np.unravel_index(int(gap.argmin()), gap.shape))
         if gap[a, b] >= _SAME_COLOR:
             break

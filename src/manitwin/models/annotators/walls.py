@@ -58,7 +58,7 @@ def density_by_wall(prior: Prior, solid: trimesh.Trimesh, seed: int) -> Interval
     thickness_m = median_thickness(solid, seed)
     if thickness_m > max(each.wall_m.high for each in options.values()):
         return None
-    return _left_open(list(options.values()), thickness_m, prior.bulk_density_kg_m3)
+    return _mixture_density(list(options.values()), thickness_m, prior.bulk_density_kg_m3)
 
 
 def density_as_stated(prior: Prior, density_kg_m3: float, solid: trimesh.Trimesh, seed: int) -> Interval | None:
@@ -107,7 +107,7 @@ def wall_materials(prior: Prior) -> dict[str, WallMaterial]:
     }
 
 
-def _left_open(options: Sequence[WallMaterial], thickness_m: float, within: Interval) -> Interval:
+def _mixture_density(options: Sequence[WallMaterial], thickness_m: float, within: Interval) -> Interval:
     """Return the mean density by the likelihood of this wall thickness, with an interval over all probable materials.
 
     All distributions are log-normal. ``within`` is the usual interval of scans; thickened sheet metal has less than the

@@ -31,7 +31,7 @@ class Guess:
 
 
 @dataclass(frozen=True)
-class Named:
+class Classification:
     """Result of a classification.
 
     ``name`` is None if no name is probable enough; ``likeliest`` has specific names, no general terms.
@@ -42,7 +42,7 @@ class Named:
     likeliest: tuple[Guess, ...]
 
 
-def classify(pictures: list[np.ndarray], min_probability: float, longest_m: float | None = None) -> Named:
+def classify(pictures: list[np.ndarray], min_probability: float, longest_m: float | None = None) -> Classification:
     """Name the object shown in pictures ``(H, W, 4) uint8`` with its matte as alpha; all pictures show the same object.
 
     The probability of a name is the sum over the ImageNet classes that it covers, at a fixed temperature (Guo et al. 2017,
@@ -72,8 +72,8 @@ def classify(pictures: list[np.ndarray], min_probability: float, longest_m: floa
     widest = guess(table.general[wider], float(general[wider]), table.general_members[wider])
     for said in (likeliest[0], widest):
         if said.probability.value >= max(min_probability, limits[said.name]):
-            return Named(said.name, said.probability, likeliest)
-    return Named(None, likeliest[0].probability, likeliest)
+            return Classification(said.name, said.probability, likeliest)
+    return Classification(None, likeliest[0].probability, likeliest)
 
 
 def softmax(values: np.ndarray) -> np.ndarray:

@@ -60,13 +60,13 @@ class ClipFolder:
     @cached_property
     def sha256(self) -> dict[str, str]:
         """SHA-256 of each file that affects the vectors, by file name."""
-        files = [self._path(name) for name in (VISION, TEXT, POINTS) if self._found(name) is not None]
+        files = [self._path(name) for name in (VISION, TEXT, POINTS) if self._find_file(name) is not None]
         files += [self.folder / name for name in (PREPROCESSOR, "vocab.json", "merges.txt")]
         return {path.name: hashlib.sha256(read_bytes(path, MAX_ONNX_BYTES, UsageError)).hexdigest() for path in files}
 
     def pictures(self, pictures: Sequence[np.ndarray]) -> np.ndarray:
         """Return the unit vectors ``(N, D)`` of pictures ``(H, W, 3) uint8`` sRGB."""
-        return self._unit([self._run(VISION, self._prepared(picture)) for picture in pictures])
+        return self._unit([self._run(VISION, self._preprocess(picture)) for picture in pictures])
 
     def texts(self, texts: Sequence[str]) -> np.ndarray:
         """Return the unit vectors ``(N, D)`` of texts."""
@@ -118,7 +118,7 @@ class ClipFolder:
             raise UsageError(f"{path}: pictures of {side} px with deviation {deviation.tolist()} cannot be; {_FEW}")
         return side, mean.astype(np.float32), deviation.astype(np.float32)
 
-    def _prepared(self, picture: np.ndarray) -> np.ndarray:
+    def _preprocess(self, picture: np.ndarray) -> np.ndarray:
         """Scale the shorter side bicubically, crop the centre, and standardize, as CLIP's preprocessor does."""
         side, mean, deviation = self._scaling
         height, width = picture.shape[:2]
@@ -136,11 +136,11 @@ class ClipFolder:
             raise UsageError(f"{self.folder}: its networks return vectors that are not finite; give another model")
         return np.asarray(vectors / lengths)
 
-    def _found(self, name: str) -> Path | None:
+    def _find_file(self, name: str) -> Path | None:
         return next((path for path in (self.folder / name, self.folder / "onnx" / name) if path.is_file()), None)
 
     def _path(self, name: str) -> Path:
-        path = self._found(name)
+        path = self._find_file(name)
         if path is None:
             raise UsageError(f"{self.folder / name}: not found, also not in onnx/; {_FEW}")
         return path
@@ -152,12 +152,12 @@ class ClipFolder:
 
     def _run(self, name: str, value: np.ndarray) -> np.ndarray:
         if name not in self._tried:
-            _require_working(self._path(name), OUTPUTS[name], value)
+            _check_runs(self._path(name), OUTPUTS[name], value)
             self._tried.add(name)
         return self._network(name).run(value)
 
 
-def _require_working(path: Path, output: str, value: np.ndarray) -> None:
+def _check_runs(path: Path, output: str, value: np.ndarray) -> None:
     """Run a network once in a subprocess, because OpenCV crashes on some broken networks."""
     try:
         run_isolated("manitwin.models.embedders.clip:run_once", path, output, value, limits=LIMITS)

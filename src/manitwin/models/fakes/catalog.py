@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.message_server import MessageServer
 from manitwin.models.fakes.server import FakeServer
@@ -83,7 +83,7 @@ def serving(
     ``polls`` is the number of status requests until a job is done.
     """
     if name not in REHEARSALS:
-        raise UsageError(choose_from("server", name, REHEARSALS))
+        raise UsageError(unknown_name_message("server", name, REHEARSALS))
     rehearsal = REHEARSALS[name]
     factory = rehearsal.factory
     takes = inspect.signature(factory).parameters

@@ -97,7 +97,7 @@ def write(asked: ChatRequest, answer: Answer, faults: Faults) -> WrittenAnswer:
         return WrittenAnswer(json.dumps({"thoughts": "something else was asked"}))
     value = answer(asked.name or str(schema.get("title", "")), schema, "\n".join(asked.texts), asked.pictures)
     if faults.strike("implausible"):
-        value = _far_too_heavy(value)
+        value = _inflate_masses(value)
     text = json.dumps(value)
     return WrittenAnswer(text[: len(text) // 2], "length") if faults.strike("cut_answer") else WrittenAnswer(text)
 
@@ -122,12 +122,12 @@ def hang(seconds: float) -> None:
     threading.Event().wait(seconds)
 
 
-def _far_too_heavy(value: Any, mass: bool = False) -> Any:
+def _inflate_masses(value: Any, mass: bool = False) -> Any:
     """Return an answer with all masses (keys that end in ``_kg``) multiplied by a thousand."""
     if isinstance(value, dict):
-        return {key: _far_too_heavy(part, mass or key.endswith("_kg")) for key, part in value.items()}
+        return {key: _inflate_masses(part, mass or key.endswith("_kg")) for key, part in value.items()}
     if isinstance(value, list):
-        return [_far_too_heavy(part, mass) for part in value]
+        return [_inflate_masses(part, mass) for part in value]
     return value * 1000 if mass and isinstance(value, float) else value
 
 

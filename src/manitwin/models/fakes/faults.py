@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterable, Mapping
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 
 FAULTS = {
     "unauthorized": "the key is refused",
@@ -46,7 +46,7 @@ class Faults:
     def __init__(self, times: Mapping[str, int] | None = None):
         for name in times or {}:
             if name not in FAULTS:
-                raise UsageError(choose_from("fault", name, FAULTS))
+                raise UsageError(unknown_name_message("fault", name, FAULTS))
         self._left = dict(times or {})
         self._lock = threading.Lock()
 
@@ -64,7 +64,7 @@ class Faults:
     def strike(self, name: str) -> bool:
         """Return whether a fault occurs now, and decrease its count."""
         if name not in FAULTS:
-            raise UsageError(choose_from("fault", name, FAULTS))
+            raise UsageError(unknown_name_message("fault", name, FAULTS))
         with self._lock:
             left = self._left.get(name, 0)
             if left > 0:

@@ -68,14 +68,14 @@ class FakeHunyuan3d:
     def _api(self, request: Request) -> Response:
         with self._lock:  # a job blocks the server's only event loop, so requests are serialized
             if request.method == "POST" and request.path in ("/generate", "/send"):
-                return self._take(request)
+                return self._accept_job(request)
             if request.method == "GET" and request.path.startswith("/status/"):
                 return self._status(request.path.removeprefix("/status/"))
             if (request.method, request.path, self.version) == ("GET", "/health", "2.1"):
                 return Response(200, {"status": "healthy", "worker_id": "abc123"})
             return Response(404, {"detail": "Not Found"})
 
-    def _take(self, request: Request) -> Response:
+    def _accept_job(self, request: Request) -> Response:
         try:
             body = request.json()
         except ValueError:

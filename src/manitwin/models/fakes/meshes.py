@@ -155,7 +155,7 @@ def draco_glb(seed: int = 0) -> bytes:
         tree["extensionsUsed"] = tree["extensionsRequired"] = ["KHR_draco_mesh_compression"]
         return tree, data
 
-    return _edited(glb([bottle(seed)]), compress)
+    return _edit_glb(glb([bottle(seed)]), compress)
 
 
 def webp_glb(seed: int = 0) -> bytes:
@@ -175,7 +175,7 @@ def webp_glb(seed: int = 0) -> bytes:
         tree["extensionsUsed"] = tree["extensionsRequired"] = ["EXT_texture_webp"]
         return tree, binary + data
 
-    return _edited(glb([bottle(seed)]), exchange)
+    return _edit_glb(glb([bottle(seed)]), exchange)
 
 
 def open_surface(seed: int = 0) -> TexturedMesh:
@@ -189,19 +189,19 @@ def open_surface(seed: int = 0) -> TexturedMesh:
     )
 
 
-def _either(format: Format, surfaces: list[TexturedMesh]) -> bytes:
+def _mesh_bytes(format: Format, surfaces: list[TexturedMesh]) -> bytes:
     return usdz(surfaces) if format == "usdz" else glb(surfaces)
 
 
 # Keys are names in faults.FAULTS. GLB-specific faults give a GLB whatever format was requested.
 FAULTY: dict[str, Callable[[Format, int], bytes]] = {
     "empty_mesh": lambda format, seed: b"",
-    "truncated_mesh": lambda format, seed: truncated(_either(format, [bottle(seed)])),
+    "truncated_mesh": lambda format, seed: truncated(_mesh_bytes(format, [bottle(seed)])),
     "draco_mesh": lambda format, seed: draco_glb(seed),
     "webp_texture": lambda format, seed: webp_glb(seed),
-    "two_meshes": lambda format, seed: _either(format, body_and_cap(seed)),
+    "two_meshes": lambda format, seed: _mesh_bytes(format, body_and_cap(seed)),
     "z_up_mesh": lambda format, seed: glb([bottle(seed)], up="z"),
-    "open_mesh": lambda format, seed: _either(format, [open_surface(seed)]),
+    "open_mesh": lambda format, seed: _mesh_bytes(format, [open_surface(seed)]),
 }
 
 
@@ -260,7 +260,7 @@ def _define_mesh(stage: Usd.Stage, surface: TexturedMesh) -> None:
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
 
 
-def _edited(data: bytes, change: Callable[[dict[str, Any], bytes], tuple[dict[str, Any], bytes]]) -> bytes:
+def _edit_glb(data: bytes, change: Callable[[dict[str, Any], bytes], tuple[dict[str, Any], bytes]]) -> bytes:
     """Return a GLB with modified JSON and binary chunks."""
     length = struct.unpack_from("<I", data, 12)[0]
     tree, binary = change(json.loads(data[20 : 20 + length]), data[28 + length :])

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.prior_records import Interval, Prior
 from manitwin.models.annotators.priors import unknown_prior
 from manitwin.models.fakes.picture_proportions import foreground, measure_proportions
@@ -37,7 +37,7 @@ _USUAL_WALL_M = 0.003
 def rehearsal_answer(schema_name: str, schema: dict[str, Any], text: str, pngs: list[bytes]) -> dict[str, Any]:
     """Answer a question, given its schema's name, its whole text and pictures; unknown schemas get a minimal valid value."""
     found = _NAME.search(text)
-    prior = lookup(found.group(1)) if found else None
+    prior = find_prior(found.group(1)) if found else None
     if schema_name == "quality":
         return _quality(prior or unknown_prior(), beside_photo="like_photo" in schema["properties"])
     if schema_name == "physical":
@@ -51,10 +51,10 @@ def rehearsal_answer(schema_name: str, schema: dict[str, Any], text: str, pngs: 
     if schema_name == "template":
         return _template(schema, found.group(1) if found else None, text)
     if schema_name in ("template_measures", "template_likeness"):
-        return _unchanged(schema_name, schema)
+        return _confirmed_template(schema_name, schema)
     if schema_name == "probe":
         return {"color": _color(pngs)}
-    answer = _of_form(schema)
+    answer = _minimal_value(schema)
     assert isinstance(answer, dict)
     return answer
 
@@ -218,11 +218,11 @@ def _template(schema: dict[str, Any], name: str | None, text: str) -> dict[str, 
     words = (asked.group(2) if asked else name or "").lower().split()
     phrases = [" ".join(words[start:end]) for end in range(len(words), 0, -1) for start in range(end)]
     called = [phrase for phrase in phrases if phrase in categories]
-    called += [prior.category for phrase in phrases if (prior := lookup(phrase)) and prior.category in categories]
+    called += [prior.category for phrase in phrases if (prior := find_prior(phrase)) and prior.category in categories]
     return {"shown": f"One {called[0] if called else 'thing'}.", "category": called[0] if called else categories[-1]}
 
 
-def _unchanged(schema_name: str, schema: dict[str, Any]) -> dict[str, Any]:
+def _confirmed_template(schema_name: str, schema: dict[str, Any]) -> dict[str, Any]:
     """Return an answer that confirms a template's usual measures and appearance."""
     first = schema_name == "template_measures"
     measures = dict.fromkeys(schema["properties"]["measures" if first else "corrected"]["properties"])
@@ -248,15 +248,15 @@ def _color(pngs: list[bytes]) -> str:
     return "green" if high == green else "blue"
 
 
-def _of_form(schema: dict[str, Any]) -> Any:
+def _minimal_value(schema: dict[str, Any]) -> Any:
     """Return a minimal value that satisfies a schema."""
     if "enum" in schema:
         return schema["enum"][0]
     if "anyOf" in schema:
-        return _of_form(schema["anyOf"][0])
+        return _minimal_value(schema["anyOf"][0])
     kind = schema.get("type")
     if kind == "object":
-        return {name: _of_form(part) for name, part in schema.get("properties", {}).items()}
+        return {name: _minimal_value(part) for name, part in schema.get("properties", {}).items()}
     if kind == "array":
-        return [_of_form(schema["items"])]
+        return [_minimal_value(schema["items"])]
     return {"string": "nothing", "number": 0.0, "integer": 0, "boolean": False}.get(str(kind))

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import ndimage
 
 
-def bled(colours: np.ndarray, mask: np.ndarray) -> np.ndarray:
+def bleed_colours(colours: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """Replace the colours of pixels that are not well inside ``mask`` by the nearest colour that is, smoothed.
 
     ``colours`` is (H, W, 3), ``mask`` (H, W) bool.

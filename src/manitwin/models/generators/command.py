@@ -21,19 +21,19 @@ from pathlib import Path
 from typing import Any
 
 from manitwin.config import BuildConfig, Resource
-from manitwin.errors import BadReply, ConfigError, InputError, Rejected, Unavailable, Unsupported, choose_from
+from manitwin.errors import BadReply, ConfigError, InputError, Rejected, Unavailable, Unsupported, unknown_name_message
 from manitwin.formats.image_file import png_of
 from manitwin.formats.sniff import sniff
 from manitwin.models.generators import supervisor
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
 from manitwin.models.services.keys import redacted
-from manitwin.models.services.refusal import Gone
+from manitwin.models.services.refusal import NotFound
 
 PLACEHOLDERS = ("image", "text", "out", "seed", "folder")
 PLACEHOLDER = re.compile(r"\{([a-z_]+)\}")
-PASSED = re.compile(r"PATH|HOME|LANG|TMPDIR|LD_LIBRARY_PATH|VIRTUAL_ENV|(CUDA|HF|CONDA)_.*|PYTHON.*")
-SECRET = re.compile(r"KEY|TOKEN|SECRET|PASSWORD", re.IGNORECASE)
-OPTION = "environment"
+PASSED_VARIABLES = re.compile(r"PATH|HOME|LANG|TMPDIR|LD_LIBRARY_PATH|VIRTUAL_ENV|(CUDA|HF|CONDA)_.*|PYTHON.*")
+SECRET_VARIABLE = re.compile(r"KEY|TOKEN|SECRET|PASSWORD", re.IGNORECASE)
+ENVIRONMENT_OPTION = "environment"
 TRY_LATER = 75  # EX_TEMPFAIL of sysexits.h: the program asks to be run again later
 ENDED_BY_SIGNAL = 128
 TAIL_BYTES = 1 << 16
@@ -41,7 +41,7 @@ FORMATS = ("glb", "usdz")
 
 
 @dataclass(frozen=True)
-class _Ended:
+class _FinishedJob:
     folder: Path
     state: JobState
 
@@ -50,8 +50,8 @@ class CommandGenerator:
     """Run a program that makes a mesh from an image or a text.
 
     ``submit`` runs the program to its end; jobs live as long as this object. The program receives the environment variables
-    that match ``PASSED`` and those named by the setting ``generate.options.environment``, and no others, so that it sees no
-    keys of other services. HF_TOKEN is passed, since models with gated weights need it. Raises ConfigError for a command
+    that match ``PASSED_VARIABLES`` and those named by the setting ``generate.options.environment``, and no others, so that it
+    sees no keys of other services. HF_TOKEN is passed, since models with gated weights need it. Raises ConfigError for a command
     without ``{out}``, without both ``{image}`` and ``{text}``, or with an unknown placeholder.
     """
 
@@ -62,12 +62,12 @@ class CommandGenerator:
     asked_with: frozenset[Asked] = IMAGE_OR_TEXT  # set per instance from the command's placeholders
 
     def __init__(self, command: str, config: BuildConfig):
-        self.words = _words(command)
-        self.model: str | None = _called(self.words)
+        self.words = _split_command(command)
+        self.model: str | None = _display_name(self.words)
         self.usd_per_job = config.services.usd_per_job or 0.0
         self.max_wait_s = config.generate.max_wait_s
-        self.environment = _named(config.generate.options)
-        self._jobs: dict[str, _Ended] = {}
+        self.environment = _passed_names(config.generate.options)
+        self._jobs: dict[str, _FinishedJob] = {}
         self._takes = {name for word in self.words for name in PLACEHOLDER.findall(word)}
         self.asked_with = frozenset(
             {"image" if "image" in self._takes else "text"}
@@ -99,7 +99,7 @@ class CommandGenerator:
             raise
         if state.state == "failed":
             shutil.rmtree(folder, ignore_errors=True)
-        self._jobs[folder.name] = _Ended(folder, state)
+        self._jobs[folder.name] = _FinishedJob(folder, state)
         return folder.name
 
     def poll(self, job_id: str) -> JobState:
@@ -121,9 +121,9 @@ class CommandGenerator:
         """Raise BadReply if the written file is missing or not a mesh."""
         _check_mesh(made)
 
-    def _job(self, job_id: str) -> _Ended:
+    def _job(self, job_id: str) -> _FinishedJob:
         if job_id not in self._jobs:
-            raise Gone(f"command: job {job_id} ended with the process that began it; run it again")
+            raise NotFound(f"command: job {job_id} ended with the process that began it; run it again")
         return self._jobs[job_id]
 
     def _program(self) -> str:
@@ -168,7 +168,7 @@ class CommandGenerator:
                 stdin=subprocess.PIPE,
                 stdout=output,
                 stderr=errors,
-                env=passed(os.environ, self.environment),
+                env=passed_environment(os.environ, self.environment),
                 start_new_session=True,  # Ctrl-C reaches only this process; the supervisor notices by the pipe
             )
         # leaving this block, also by an exception, closes the pipe, upon which the supervisor ends the program
@@ -198,18 +198,18 @@ class CommandGenerator:
             stream.seek(max(0, log.stat().st_size - TAIL_BYTES))
             lines = stream.read().decode(errors="replace").split("\n")
         said = next((line for line in reversed(lines) if line.strip()), "")
-        for name, value in passed(os.environ, self.environment).items():
-            if value and SECRET.search(name):
+        for name, value in passed_environment(os.environ, self.environment).items():
+            if value and SECRET_VARIABLE.search(name):
                 said = redacted(said, value)
         return redacted(said, None)
 
 
-def passed(environment: Mapping[str, str], named: tuple[str, ...]) -> dict[str, str]:
-    """Return the environment variables that a program receives: those that match ``PASSED`` and those in ``named``."""
-    return {name: value for name, value in environment.items() if name in named or PASSED.fullmatch(name)}
+def passed_environment(environment: Mapping[str, str], named: tuple[str, ...]) -> dict[str, str]:
+    """Return the environment variables that a program receives: those that match ``PASSED_VARIABLES`` and those in ``named``."""
+    return {name: value for name, value in environment.items() if name in named or PASSED_VARIABLES.fullmatch(name)}
 
 
-def _words(command: str) -> tuple[str, ...]:
+def _split_command(command: str) -> tuple[str, ...]:
     """Split a command into arguments; raises ConfigError for missing or unknown placeholders."""
     try:
         words = tuple(shlex.split(command))
@@ -219,26 +219,26 @@ def _words(command: str) -> tuple[str, ...]:
         raise ConfigError("command: nothing to run; give command:PROGRAM {image} {out}")
     names = {name for word in words for name in PLACEHOLDER.findall(word)}
     for name in sorted(names - set(PLACEHOLDERS)):
-        raise ConfigError(f"command: {choose_from('placeholder', name, PLACEHOLDERS)}")
+        raise ConfigError(f"command: {unknown_name_message('placeholder', name, PLACEHOLDERS)}")
     if "out" not in names or not names & {"image", "text"}:
         raise ConfigError("command: it needs {out}, and {image} or {text}, among its arguments")
     return words
 
 
-def _called(words: tuple[str, ...]) -> str:
+def _display_name(words: tuple[str, ...]) -> str:
     """Return the display name of a command: its program and script without their folders."""
     named = [Path(word).name for word in words[:2] if not PLACEHOLDER.search(word) and not word.startswith("-")]
     return " ".join(named) or words[0]
 
 
-def _named(options: Mapping[str, Any]) -> tuple[str, ...]:
+def _passed_names(options: Mapping[str, Any]) -> tuple[str, ...]:
     for option in options:
-        if option != OPTION:
+        if option != ENVIRONMENT_OPTION:
             raise ConfigError(
-                f"generate.options: {choose_from('option', option, [OPTION])};"
+                f"generate.options: {unknown_name_message('option', option, [ENVIRONMENT_OPTION])};"
                 " the command takes its options as arguments"
             )
-    return tuple(str(options.get(OPTION, "")).split())
+    return tuple(str(options.get(ENVIRONMENT_OPTION, "")).split())
 
 
 def _check_mesh(path: Path) -> None:

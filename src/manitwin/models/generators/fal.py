@@ -20,14 +20,14 @@ from manitwin.errors import BadReply, ConfigError, Unsupported
 from manitwin.models.generators.protocol import Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.vendor import VendorGenerator, checked_address, data_uri, submit_paid
 from manitwin.models.services.http import HttpService, origin
-from manitwin.models.services.refusal import Gone, Refusal, refusal_by_status, words_of
+from manitwin.models.services.refusal import NotFound, Refusal, error_message, refusal_by_status
 
 VENDOR = "https://queue.fal.run"
 # documented hosts of the queue (.../inference-api/openapi/queue.json, "servers"): a key for one is valid for the other
 VENDOR_HOSTS = ("queue.fal.run", "queue.falrun.com")
-KEY = "FAL_KEY"
-DEFAULT = "fal-ai/trellis"
-WORKING: dict[str, Literal["queued", "running"]] = {"IN_QUEUE": "queued", "IN_PROGRESS": "running"}
+KEY_VARIABLE = "FAL_KEY"
+DEFAULT_ENDPOINT = "fal-ai/trellis"
+PENDING_STATES: dict[str, Literal["queued", "running"]] = {"IN_QUEUE": "queued", "IN_PROGRESS": "running"}
 MOST_PARTS = 100_000  # maximum number of values of a result that are searched for a mesh
 
 
@@ -65,17 +65,17 @@ class FalGenerator(VendorGenerator):
     """
 
     name = "fal"
-    url, keys = VENDOR, (KEY,)
-    default_model = DEFAULT
+    url, keys = VENDOR, (KEY_VARIABLE,)
+    default_model = DEFAULT_ENDPOINT
     written_name, made = "generated.glb", "GLB"
-    remedy = f"check {KEY} and your balance at https://fal.ai/dashboard/billing"
+    remedy = f"check {KEY_VARIABLE} and your balance at https://fal.ai/dashboard/billing"
 
     def __init__(
         self, endpoint: str, url: str, key: str | None, config: BuildConfig, sleep: Callable[[float], None] = time.sleep
     ):
         if endpoint.count("/") < 1 or not all(endpoint.split("/")):
-            raise ConfigError(f"fal: {endpoint!r} is not an endpoint; give OWNER/APP such as {DEFAULT}")
-        self.takes = self.taken_by(endpoint)
+            raise ConfigError(f"fal: {endpoint!r} is not an endpoint; give OWNER/APP such as {DEFAULT_ENDPOINT}")
+        self.takes = self.endpoint_input(endpoint)
         super().__init__(endpoint, url, key, config, sleep, listed_usd=self.takes.usd if url == VENDOR else None)
         takes: dict[Asked, bool] = {"image": self.takes.image is not None, "text": self.takes.prompt}
         self.asked_with = frozenset(asked for asked, taken in takes.items() if taken)
@@ -83,19 +83,19 @@ class FalGenerator(VendorGenerator):
         if url.startswith("https://") and urlsplit(url).netloc in VENDOR_HOSTS:
             hosts += [f"https://{host}" for host in VENDOR_HOSTS if f"https://{host}" != url]
         # services for follow-up requests about an accepted job
-        self._begun = [self._served(host, key, config, sleep, _unless_failed) for host in hosts]
+        self._begun = [self._http_service(host, key, config, sleep, _refusal_of) for host in hosts]
 
     @staticmethod
-    def taken_by(endpoint: str) -> Endpoint:
+    def endpoint_input(endpoint: str) -> Endpoint:
         """Return the input description of an endpoint."""
-        return ENDPOINTS.get(endpoint) or _guessed(endpoint)
+        return ENDPOINTS.get(endpoint) or _guess_input(endpoint)
 
     @staticmethod
     def first_address(result: Any) -> str | None:
         """Return the address of the generated file, None if the result has none."""
         return first_glb(result)
 
-    def priced_as(self, model: str) -> str:
+    def price_label(self, model: str) -> str:
         """Return the name used in the error about a missing price: prices belong to endpoints."""
         return f"fal:{model}"
 
@@ -106,7 +106,7 @@ class FalGenerator(VendorGenerator):
     def probe(self) -> str:
         """Ask for the status of a request that does not exist: only a valid key is told so (undocumented; costs nothing)."""
         app = "/".join(str(self.model).split("/")[:2])
-        with suppress(Gone):  # the expected answer
+        with suppress(NotFound):  # the expected answer
             self._service.get_json(f"/{app}/requests/00000000-0000-0000-0000-000000000000/status")
         return "the queue takes the key"
 
@@ -125,20 +125,20 @@ class FalGenerator(VendorGenerator):
 
     def poll(self, job_id: str) -> JobState:
         """Return the state of a request; a completed request may have failed."""
-        status_url, response_url = _addresses(job_id)
+        status_url, response_url = _split_job_id(job_id)
         status = self._service_of(status_url).get_json(status_url).get("status")
-        if isinstance(status, str) and status in WORKING:
-            return JobState(WORKING[status])
+        if isinstance(status, str) and status in PENDING_STATES:
+            return JobState(PENDING_STATES[status])
         if status != "COMPLETED":
             raise BadReply(f"fal: the request has the unknown status {self._service.said(str(status))!r}")
         result = self._result(response_url)
         if result.get("detail") and self.first_address(result) is None:
-            return JobState("failed", self._service.said(words_of(result)))
+            return JobState("failed", self._service.said(error_message(result)))
         return JobState("done")
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
         """Download the generated file into ``folder``."""
-        response_url = _addresses(job_id)[1]
+        response_url = _split_job_id(job_id)[1]
 
         def link() -> str:
             return checked_address(self.first_address(self._result(response_url)), "fal", self.made)
@@ -184,7 +184,7 @@ class FalGenerator(VendorGenerator):
 
 def first_glb(result: Any) -> str | None:
     """Return the first address of a GLB in a result: by its path, or by the file name or content type beside it."""
-    for part in _parts(result):
+    for part in _nested_values(result):
         if isinstance(part, str) and _is_glb_address(part):
             return part
         if isinstance(part, Mapping) and isinstance(part.get("url"), str):
@@ -194,7 +194,7 @@ def first_glb(result: Any) -> str | None:
     return None
 
 
-def _parts(result: Any) -> Iterator[Any]:
+def _nested_values(result: Any) -> Iterator[Any]:
     """Iterate over the values of a nested result in document order, without recursion; at most ``MOST_PARTS``."""
     waiting = [result]
     for _ in range(MOST_PARTS):
@@ -216,19 +216,19 @@ def _is_glb_address(text: str) -> bool:
     return bool(parts.scheme and parts.netloc) and parts.path.lower().endswith(".glb")
 
 
-def _addresses(job_id: str) -> tuple[str, str]:
+def _split_job_id(job_id: str) -> tuple[str, str]:
     status, _, response = job_id.partition(" ")
     return checked_address(status, "fal", "status_url"), checked_address(response, "fal", "response_url")
 
 
-def _unless_failed(status: int, body: Any) -> Refusal | None:
+def _refusal_of(status: int, body: Any) -> Refusal | None:
     """Read a refusal; an answer that reports a permanently failed request is not one, so that it can be read as a result."""
     if status in (400, 422) or (status >= 500 and isinstance(body, Mapping) and "error_type" in body):
         return None
     return refusal_by_status(status, body)
 
 
-def _guessed(endpoint: str) -> Endpoint:
+def _guess_input(endpoint: str) -> Endpoint:
     """Guess from the name of an unlisted endpoint what it takes: a text, a picture, or either."""
     if "text-to-3d" in endpoint:
         return Endpoint(None, prompt=True)

@@ -24,7 +24,7 @@ LEAST_AREA_SHARE = 0.4
 MAX_TEXTURE_PX = 8192  # the largest that generators make; the mesh stage reduces textures to its own limit
 
 
-def flaw(path: Path) -> str | None:
+def find_flaw(path: Path) -> str | None:
     """Return why a mesh file cannot be used, None if it can.
 
     The file is read as the mesh stage reads it, and repaired with default settings. Refused are unreadable or truncated
@@ -57,7 +57,7 @@ def flaw(path: Path) -> str | None:
     return None
 
 
-def as_glb(path: Path) -> bytes:
+def convert_to_glb(path: Path) -> bytes:
     """Return a mesh file as a Y-up GLB; a GLB is returned unchanged, byte for byte.
 
     For other formats (USDZ) all meshes, textures and materials are kept, one part per mesh and material, and lengths are

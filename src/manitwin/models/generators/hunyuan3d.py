@@ -21,13 +21,13 @@ from typing import Any
 from urllib.parse import quote
 
 from manitwin.config import BuildConfig, Resource
-from manitwin.errors import BadReply, ConfigError, Unavailable, Unsupported, choose_from
+from manitwin.errors import BadReply, ConfigError, Unavailable, Unsupported, unknown_name_message
 from manitwin.formats.image_file import png_of
 from manitwin.models.generators.protocol import Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.vendor import submit_paid
 from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import split_url
-from manitwin.models.services.refusal import Gone, Refusal, refusal_by_status
+from manitwin.models.services.refusal import NotFound, Refusal, refusal_by_status
 
 VENDOR = "http://localhost:8081"  # default port of api_server.py
 VERSION = "2.1"
@@ -37,7 +37,7 @@ OPTIONS = {
 }
 SEEDS = 2**32
 MAX_ANSWER_BYTES = 384 << 20  # a mesh of 288 MiB in base64, held in memory, twice while it is parsed
-WORKING = {"processing": "running", "texturing": "running"}
+PENDING_STATES = {"processing": "running", "texturing": "running"}
 
 
 class Hunyuan3dGenerator:
@@ -53,16 +53,16 @@ class Hunyuan3dGenerator:
 
     def __init__(self, version: str, base_url: str, config: BuildConfig, sleep: Callable[[float], None] = time.sleep):
         if version not in OPTIONS:
-            raise ConfigError(f"hunyuan3d: {choose_from('version', version, OPTIONS)}")
+            raise ConfigError(f"hunyuan3d: {unknown_name_message('version', version, OPTIONS)}")
         for option in config.generate.options:
             if option not in OPTIONS[version]:
-                raise ConfigError(f"generate.options: {choose_from('option', option, OPTIONS[version])}")
+                raise ConfigError(f"generate.options: {unknown_name_message('option', option, OPTIONS[version])}")
         self.version = version
         self.model: str | None = f"Hunyuan3D {version}"
         self.usd_per_job = config.services.usd_per_job or 0.0
         self._options: dict[str, Any] = {"texture": True, **config.generate.options}
-        self._service = self._served(base_url, config, config.services.timeout_s, sleep)
-        self._patient = self._served(base_url, config, config.generate.max_wait_s, sleep)
+        self._service = self._http_service(base_url, config, config.services.timeout_s, sleep)
+        self._patient = self._http_service(base_url, config, config.generate.max_wait_s, sleep)
         self._made: dict[str, bytes] = {}
 
     def __repr__(self) -> str:
@@ -101,17 +101,17 @@ class Hunyuan3dGenerator:
 
     def poll(self, job_id: str) -> JobState:
         """Return the state of a job; raises Gone for a ``/generate`` job of another process."""
-        how, uid = self._parts(job_id)
+        how, uid = self._split_job_id(job_id)
         if how == "generate" or job_id in self._made:
             return JobState("done")
         answer = self._status(uid)
         status = answer.get("status")
         if status == "completed":
-            self._made[job_id] = _model(answer)
+            self._made[job_id] = _mesh_bytes(answer)
             return JobState("done")
         if status == "error":  # a state of forks; the servers above do not have it
             return JobState("failed", self._service.said(str(answer.get("message") or "")))
-        if not isinstance(status, str) or status not in WORKING:
+        if not isinstance(status, str) or status not in PENDING_STATES:
             raise BadReply(
                 f"hunyuan3d: job {self._service.said(uid)} has the unknown status {self._service.said(str(status))!r}"
             )
@@ -119,9 +119,9 @@ class Hunyuan3dGenerator:
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
         """Write the GLB into ``folder``."""
-        how, uid = self._parts(job_id)
+        how, uid = self._split_job_id(job_id)
         if how == "send" and job_id not in self._made:
-            self._made[job_id] = _model(self._status(uid))
+            self._made[job_id] = _mesh_bytes(self._status(uid))
         path = folder / "generated.glb"
         path.write_bytes(self._made.pop(job_id))
         return Generated(path, self.model, {"textured": bool(self._options["texture"])})
@@ -139,15 +139,15 @@ class Hunyuan3dGenerator:
     def _status(self, uid: str) -> dict[str, Any]:
         return self._service.get_json(f"/status/{quote(uid, safe='')}", max_bytes=MAX_ANSWER_BYTES)
 
-    def _parts(self, job_id: str) -> tuple[str, str]:
+    def _split_job_id(self, job_id: str) -> tuple[str, str]:
         how, _, uid = job_id.partition(":")
         if how not in ("send", "generate") or not uid:
             raise BadReply(f"hunyuan3d: {job_id!r} is not a job id of this generator; run it again")
         if how == "generate" and job_id not in self._made:
-            raise Gone(f"hunyuan3d: job {job_id} ended with the process that began it; run it again")
+            raise NotFound(f"hunyuan3d: job {job_id} ended with the process that began it; run it again")
         return how, uid
 
-    def _served(
+    def _http_service(
         self, base_url: str, config: BuildConfig, timeout_s: float, sleep: Callable[[float], None]
     ) -> HttpService:
         services = config.services.model_copy(update={"timeout_s": timeout_s})
@@ -169,7 +169,7 @@ def _refusal(status: int, body: Any) -> Refusal | None:
     return refusal_by_status(status, body)
 
 
-def _model(answer: Mapping[str, Any]) -> bytes:
+def _mesh_bytes(answer: Mapping[str, Any]) -> bytes:
     model = answer.get("model_base64")
     if answer.get("status") != "completed" or not isinstance(model, str):
         raise BadReply("hunyuan3d: its answer has no 'model_base64'")

@@ -16,18 +16,25 @@ from urllib.parse import quote
 from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, Rejected
 from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
-from manitwin.models.generators.vendor import VendorGenerator, checked_address, data_uri, is_name, number, submit_paid
+from manitwin.models.generators.vendor import (
+    VendorGenerator,
+    checked_address,
+    data_uri,
+    is_name,
+    plausible_number,
+    submit_paid,
+)
 
 VENDOR = "https://api.meshy.ai"
-KEY = "MESHY_API_KEY"
-MODEL = "meshy-6"
+KEY_VARIABLE = "MESHY_API_KEY"
+DEFAULT_MODEL = "meshy-6"
 IMAGE, TEXT, BALANCE = "/openapi/v1/image-to-3d", "/openapi/v2/text-to-3d", "/openapi/v1/balance"
 LONGEST_TEXT = 600  # characters of a prompt, as documented
-OF_REFINE = frozenset({"enable_pbr", "hd_texture", "texture_prompt", "texture_image_url", "remove_lighting"})
-OF_BOTH = frozenset({"moderation", "auto_size", "origin_at"})
+REFINE_OPTIONS = frozenset({"enable_pbr", "hd_texture", "texture_prompt", "texture_image_url", "remove_lighting"})
+COMMON_OPTIONS = frozenset({"moderation", "auto_size", "origin_at"})
 STATES = {"PENDING": "queued", "IN_PROGRESS": "running", "SUCCEEDED": "done", "FAILED": "failed", "CANCELED": "failed"}
-PAGE = 50  # tasks per page of the list; the documented maximum
-PAGES = 20
+PAGE_SIZE = 50  # tasks per page of the list; the documented maximum
+MOST_PAGES = 20
 
 
 class MeshyGenerator(VendorGenerator):
@@ -38,9 +45,9 @@ class MeshyGenerator(VendorGenerator):
     """
 
     name = "meshy"
-    url, keys = VENDOR, (KEY,)
-    default_model, model_option = MODEL, "ai_model"
-    remedy = f"check {KEY} and your credits at https://www.meshy.ai/settings/api"
+    url, keys = VENDOR, (KEY_VARIABLE,)
+    default_model, model_option = DEFAULT_MODEL, "ai_model"
+    remedy = f"check {KEY_VARIABLE} and your credits at https://www.meshy.ai/settings/api"
 
     def __init__(
         self, model: str, url: str, key: str | None, config: BuildConfig, sleep: Callable[[float], None] = time.sleep
@@ -51,7 +58,7 @@ class MeshyGenerator(VendorGenerator):
 
     def probe(self) -> str:
         """Query the account's balance."""
-        balance = number(self._service.get_json(BALANCE).get("balance"))
+        balance = plausible_number(self._service.get_json(BALANCE).get("balance"))
         if balance is None:
             raise BadReply("meshy: its answer about the balance has no 'balance'")
         return f"{balance:g} credits left"
@@ -73,14 +80,14 @@ class MeshyGenerator(VendorGenerator):
                 detail = f"meshy takes texts of 1 to {LONGEST_TEXT} characters; this one has {len(text)}"
                 raise Rejected("generator_failed", detail, "generate")
             body = {"mode": "preview", "prompt": text, "ai_model": self.model, "target_formats": ["glb"]}
-            preview = self._submit(TEXT, body | self._options_but(OF_REFINE))
+            preview = self._submit(TEXT, body | self._options_without(REFINE_OPTIONS))
             self._own_previews.add(preview)
             job_id = f"text:{preview}"
         return job_id
 
     def poll(self, job_id: str) -> JobState:
         """Return the state of a job; for a text, a finished preview is followed by a refine task."""
-        kind, id = _parts(job_id)
+        kind, id = _split_job_id(job_id)
         if kind == "image":
             return _state(self._task(IMAGE, id))
         if id not in self._refines:
@@ -93,7 +100,7 @@ class MeshyGenerator(VendorGenerator):
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
         """Download the GLB into ``folder``."""
-        kind, id = _parts(job_id)
+        kind, id = _split_job_id(job_id)
         place, tasks = IMAGE, [id]
         if kind == "text":
             if id not in self._refines:
@@ -102,7 +109,7 @@ class MeshyGenerator(VendorGenerator):
         made = [self._task(place, task) for task in tasks]
         path = folder / "generated.glb"
         self._service.download(_link(made[-1]), path, fresh_url=lambda: _link(self._task(place, tasks[-1])))
-        credits = [used for task in made if (used := number(task.get("consumed_credits"))) is not None]
+        credits = [used for task in made if (used := plausible_number(task.get("consumed_credits"))) is not None]
         return Generated(path, self.model, {"consumed_credits": sum(credits)} if credits else {})
 
     def _refine(self, preview: Mapping[str, Any]) -> None:
@@ -117,7 +124,7 @@ class MeshyGenerator(VendorGenerator):
         }
         if text and "texture_image_url" not in self._options:
             body["texture_prompt"] = text  # the list of tasks returns this text, which identifies the refine task
-        body |= {name: value for name, value in self._options.items() if name in OF_REFINE | OF_BOTH}
+        body |= {name: value for name, value in self._options.items() if name in REFINE_OPTIONS | COMMON_OPTIONS}
         if id in self._own_previews:
             found = None
             self._own_previews.discard(id)  # if this answer is lost, the next attempt looks in the list
@@ -127,20 +134,20 @@ class MeshyGenerator(VendorGenerator):
 
     def _refine_among_latest(self, preview: Mapping[str, Any], text: str) -> str | None:
         """Return the id of the refine task with this text among the tasks created after the preview, None if there is none."""
-        since = number(preview.get("finished_at")) or 0
-        for page in range(1, PAGES + 1):
-            tasks = self._listed(page)
+        since = plausible_number(preview.get("finished_at")) or 0
+        for page in range(1, MOST_PAGES + 1):
+            tasks = self._list_tasks(page)
             for task in tasks:
-                if task.get("type") != "text-to-3d-refine" or _created(task) < since:
+                if task.get("type") != "text-to-3d-refine" or _creation_time(task) < since:
                     continue
                 if text == (task.get("texture_prompt") or task.get("prompt")) and is_name(task.get("id")):
                     return str(task["id"])
-            if len(tasks) < PAGE or any(_created(task) < since for task in tasks):
+            if len(tasks) < PAGE_SIZE or any(_creation_time(task) < since for task in tasks):
                 return None
         return None
 
-    def _listed(self, page: int) -> list[dict[str, Any]]:
-        tasks = self._service.get_list(f"{TEXT}?page_num={page}&page_size={PAGE}&sort_by=-created_at")
+    def _list_tasks(self, page: int) -> list[dict[str, Any]]:
+        tasks = self._service.get_list(f"{TEXT}?page_num={page}&page_size={PAGE_SIZE}&sort_by=-created_at")
         if not all(isinstance(task, dict) for task in tasks):
             raise BadReply("meshy: its list of tasks contains other items; run it again")
         return tasks
@@ -158,11 +165,11 @@ class MeshyGenerator(VendorGenerator):
         said = self._service.said(str(error.get("message") or "")) if isinstance(error, Mapping) else ""
         return task | {"id": id, "said": said}
 
-    def _options_but(self, names: frozenset[str]) -> dict[str, Any]:
+    def _options_without(self, names: frozenset[str]) -> dict[str, Any]:
         return {name: value for name, value in self._options.items() if name not in names}
 
 
-def _parts(job_id: str) -> tuple[str, str]:
+def _split_job_id(job_id: str) -> tuple[str, str]:
     kind, _, id = job_id.partition(":")
     if kind not in ("image", "text") or not id:
         raise BadReply(f"meshy: {job_id!r} is not a job id of this generator; run it again")
@@ -174,8 +181,8 @@ def _state(task: Mapping[str, Any]) -> JobState:
     return JobState(state, task["said"] or task["status"].lower() if state == "failed" else "")  # type: ignore[arg-type]
 
 
-def _created(task: Mapping[str, Any]) -> float:
-    return number(task.get("created_at")) or 0
+def _creation_time(task: Mapping[str, Any]) -> float:
+    return plausible_number(task.get("created_at")) or 0
 
 
 def _link(task: Mapping[str, Any]) -> str:

@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from manitwin.config import BuildConfig
-from manitwin.errors import BadReply, ConfigError, choose_from
+from manitwin.errors import BadReply, ConfigError, unknown_name_message
 from manitwin.formats.image_file import png_of
 from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
-from manitwin.models.generators.vendor import VendorGenerator, checked_address, is_name, number
+from manitwin.models.generators.vendor import VendorGenerator, checked_address, is_name, plausible_number
 from manitwin.models.services.http import FormFile
-from manitwin.models.services.refusal import Gone, Refusal, kind_of_status, refusal_by_status
+from manitwin.models.services.refusal import NotFound, Refusal, kind_of_status, refusal_by_status
 
 URL = "https://api.hyper3d.com/api/v2"
 KEYS = ("RODIN_API_KEY", "HYPER3D_API_KEY")
@@ -29,13 +29,13 @@ TIERS = (
     "Sketch", "Regular", "Detail", "Smooth", "Gen-2", "Gen-2.5-Extreme-Low", "Gen-2.5-Low", "Gen-2.5-Medium",
     "Gen-2.5-High", "Gen-2.5-Extreme-High",
 )  # fmt: skip
-READABLE = ("glb", "usdz")
+READABLE_FORMATS = ("glb", "usdz")
 SEEDS = 65536
-DENIED = {
+ACCOUNT_ERRORS = {
     "UNAUTHORIZED", "NO_ACTIVE_SUBSCRIPTION", "SUBSCRIPTION_PLAN_TOO_LOW", "INSUFFICIENT_FUND", "USER_NOT_FOUND",
     "GROUP_NOT_FOUND", "PERMISSION_DENIED",
 }  # fmt: skip
-OF_THE_INPUT = {"IMAGE_CONTENT_VIOLATION", "OBJECT_NOT_FOUND_ON_IMAGE"}
+INPUT_ERRORS = {"IMAGE_CONTENT_VIOLATION", "OBJECT_NOT_FOUND_ON_IMAGE"}
 
 
 class RodinGenerator(VendorGenerator):
@@ -55,17 +55,17 @@ class RodinGenerator(VendorGenerator):
         self, tier: str, url: str, key: str | None, config: BuildConfig, sleep: Callable[[float], None] = time.sleep
     ):
         if tier not in TIERS:
-            raise ConfigError(choose_from("tier of rodin", tier, TIERS))
+            raise ConfigError(unknown_name_message("tier of rodin", tier, TIERS))
         super().__init__(tier, url, key, config, sleep, refusal=refusal_of)
         self._fields = {"tier": tier, "geometry_file_format": "glb", "material": "PBR", "mesh_mode": "Raw"}
         self._fields |= {name: _form_value(value) for name, value in self._options.items()}
         self._format = self._fields["geometry_file_format"]
-        if self._format not in READABLE:
-            raise ConfigError(choose_from("geometry_file_format of rodin", self._format, READABLE))
+        if self._format not in READABLE_FORMATS:
+            raise ConfigError(unknown_name_message("geometry_file_format of rodin", self._format, READABLE_FORMATS))
 
     def probe(self) -> str:
         """Query the account's credits."""
-        balance = number(self._service.get_json("check_balance").get("balance"))
+        balance = plausible_number(self._service.get_json("check_balance").get("balance"))
         if balance is None:
             raise BadReply("rodin: its answer about the balance has no 'balance'")
         return f"{balance:g} credits left"
@@ -108,7 +108,7 @@ class RodinGenerator(VendorGenerator):
     def _link(self, job_id: str) -> str:
         files = self._service.post_json("download", {"task_uuid": json.loads(job_id)[0]}).get("list")
         if not files:
-            raise Gone("rodin: the files of a finished task are gone; they are kept for 7 days")
+            raise NotFound("rodin: the files of a finished task are gone; they are kept for 7 days")
         for file in files if isinstance(files, list) else ():
             if isinstance(file, dict) and str(file.get("name", "")).lower().endswith(f".{self._format}"):
                 return checked_address(file.get("url"), "rodin", "model")
@@ -122,9 +122,9 @@ def refusal_of(status: int, body: Any) -> Refusal | None:
         return refusal_by_status(status, body)
     plain = str(code).upper().removeprefix("API_")
     message = ": ".join(dict.fromkeys(str(part) for part in (code, body.get("message")) if part))
-    if plain in DENIED:
+    if plain in ACCOUNT_ERRORS:
         return Refusal(message, "denied")
-    if plain in OF_THE_INPUT:
+    if plain in INPUT_ERRORS:
         return Refusal(message, "input")
     if plain == "PARALLELISM_LIMIT_REACHED":
         return Refusal(message, "busy")

@@ -14,11 +14,11 @@ import numpy as np
 
 from manitwin.config import GenerateConfig
 from manitwin.engine.charges import charge
-from manitwin.engine.job_memory import JobMemory, NoMemory
+from manitwin.engine.job_memory import JobMemory, NullJobMemory
 from manitwin.errors import BackendError, BadReply, Rejected, Unavailable
-from manitwin.models.generators.generated_mesh import flaw
+from manitwin.models.generators.generated_mesh import find_flaw
 from manitwin.models.generators.protocol import Generated, GenerationRequest, Generator
-from manitwin.models.services.refusal import Gone, Unanswered
+from manitwin.models.services.refusal import AnswerLost, NotFound
 
 FIRST_WAIT_S = 1.0
 LONGEST_WAIT_S = 30.0
@@ -33,7 +33,7 @@ def run_generator(
     jobs: JobMemory,
     submit_again: bool = False,
     sleep: Callable[[float], None] = time.sleep,
-    flaw_of: Callable[[Path], str | None] = flaw,
+    flaw_of: Callable[[Path], str | None] = find_flaw,
 ) -> Generated:
     """Return the mesh for ``request``, written into ``folder``.
 
@@ -49,39 +49,39 @@ def run_generator(
     stored), BadReply if an interrupted submit is stored or no file was written, and the errors of the generator itself.
     """
     service = generator.needs == "generator"
-    drive = _Drive(
+    drive = _JobRun(
         generator,
         folder,
-        jobs if service else NoMemory(),
+        jobs if service else NullJobMemory(),
         request_digest(generator, request, settings),
         settings.max_wait_s,
         sleep,
         flaw_of,
     )
     try:
-        return _driven(drive, request, settings.attempts, submit_again)
+        return _run_attempts(drive, request, settings.attempts, submit_again)
     except (Exception, KeyboardInterrupt):
         drive.settle()  # the caller counts the charges after an error, unlike after a crash
         raise
 
 
-def _driven(drive: _Drive, request: GenerationRequest, attempts: int, submit_again: bool) -> Generated:
+def _run_attempts(drive: _JobRun, request: GenerationRequest, attempts: int, submit_again: bool) -> Generated:
     """Poll or submit until an attempt succeeds; raises Rejected if all attempts fail."""
-    note = drive.recalled(submit_again)
+    note = drive.load_note(submit_again)
     while note.job_id is not None or note.attempt < attempts:
         recalled = note.job_id is not None
         if not recalled:
-            note = drive.submitted(replace(request, seed=request.seed + note.attempt), note)
+            note = drive.submit_job(replace(request, seed=request.seed + note.attempt), note)
         try:
-            return drive.result(str(note.job_id))
-        except Gone:
+            return drive.wait_and_fetch(str(note.job_id))
+        except NotFound:
             if not recalled:
                 raise
             note = replace(note, job_id=None)
         except _Failed as failure:
             note = replace(note, attempt=note.attempt + 1, job_id=None, failures=(*note.failures, str(failure)))
     drive.forget()
-    raise Rejected("generator_failed", f"{drive.generator.name}: {_told(note.failures)}", "generate")
+    raise Rejected("generator_failed", f"{drive.generator.name}: {_format_failures(note.failures)}", "generate")
 
 
 def request_digest(generator: Generator, request: GenerationRequest, settings: GenerateConfig) -> str:
@@ -132,19 +132,19 @@ class _Note:
 
 
 @dataclass
-class _Drive:
+class _JobRun:
     """State of one request while it is driven: its generator, stored note, and remaining waiting time."""
 
     generator: Generator
     folder: Path
     jobs: JobMemory
     digest: str
-    left_s: float
+    remaining_s: float
     sleep: Callable[[float], None]
     flaw_of: Callable[[Path], str | None]
-    kept: _Note | None = None
+    stored_note: _Note | None = None
 
-    def recalled(self, submit_again: bool) -> _Note:
+    def load_note(self, submit_again: bool) -> _Note:
         """Return the stored state of the request.
 
         Raises BadReply for a paid submit of unknown outcome, unless ``submit_again``.
@@ -152,7 +152,7 @@ class _Drive:
         text = self.jobs.recall(self.digest)
         if text is None:
             return _Note()
-        note = self.kept = _Note.read(text)
+        note = self.stored_note = _Note.read(text)
         charge(note.unsettled_usd)
         if note.submitting and self.generator.usd_per_job and not submit_again:
             raise BadReply(
@@ -161,29 +161,29 @@ class _Drive:
             )
         return replace(note, submitting=False)
 
-    def submitted(self, request: GenerationRequest, note: _Note) -> _Note:
+    def submit_job(self, request: GenerationRequest, note: _Note) -> _Note:
         """Submit a job and store it; its cost is charged as soon as the service may have accepted it."""
         usd = self.generator.usd_per_job
         if usd:
             # a crash from here on leaves a note with ``submitting`` set
-            self._keep(replace(note, submitting=True, unsettled_usd=note.unsettled_usd + usd))
+            self._store_note(replace(note, submitting=True, unsettled_usd=note.unsettled_usd + usd))
         try:
             job_id = self.generator.submit(request)
-        except Unanswered:
+        except AnswerLost:
             charge(usd)
             raise
         except (BackendError, Rejected):
             if note == _Note():
                 self.forget()
             else:
-                self._keep(note)
+                self._store_note(note)
             raise
         charge(usd)
         note = replace(note, job_id=job_id, unsettled_usd=note.unsettled_usd + usd)
-        self._keep(note)
+        self._store_note(note)
         return note
 
-    def result(self, job_id: str) -> Generated:
+    def wait_and_fetch(self, job_id: str) -> Generated:
         """Return the mesh of a job; raises _Failed, Gone, Unavailable, and BadReply if no file was written."""
         self._wait_for(job_id)
         generated = self.generator.fetch(job_id, self.folder)
@@ -200,33 +200,33 @@ class _Drive:
         """Poll with growing pauses until the job is done; raises _Failed if it failed, Unavailable if time runs out."""
         pause = FIRST_WAIT_S
         while (job := self.generator.poll(job_id)).state not in ("done", "failed"):
-            if pause > self.left_s:
+            if pause > self.remaining_s:
                 raise Unavailable(
                     f"{self.generator.name}: its job is still {job.state} after all of generate.max_wait_s; the job"
                     f" is remembered; run again later"
                 )
             self.sleep(pause)
-            self.left_s -= pause
+            self.remaining_s -= pause
             pause = min(2 * pause, LONGEST_WAIT_S)
         if job.state == "failed":
             raise _Failed(job.message or "its job failed and it gave no reason")
 
     def settle(self) -> None:
         """Record that the charges have been counted."""
-        if self.kept is not None and self.kept.unsettled_usd:
-            self._keep(replace(self.kept, unsettled_usd=0.0))
+        if self.stored_note is not None and self.stored_note.unsettled_usd:
+            self._store_note(replace(self.stored_note, unsettled_usd=0.0))
 
     def forget(self) -> None:
         """Delete the stored state."""
         self.jobs.forget(self.digest)
-        self.kept = None
+        self.stored_note = None
 
-    def _keep(self, note: _Note) -> None:
-        self.kept = note
+    def _store_note(self, note: _Note) -> None:
+        self.stored_note = note
         self.jobs.note(self.digest, json.dumps(asdict(note)))
 
 
-def _told(failures: tuple[str, ...]) -> str:
+def _format_failures(failures: tuple[str, ...]) -> str:
     if len(set(failures)) == 1:
         return failures[0] if len(failures) == 1 else f"{len(failures)} times in {len(failures)}: {failures[0]}"
     return "; ".join(f"attempt {number}: {why}" for number, why in enumerate(failures, 1))

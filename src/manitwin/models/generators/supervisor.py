@@ -14,7 +14,7 @@ import signal
 import subprocess
 import sys
 
-LOOK_EVERY_S = 0.05
+POLL_INTERVAL_S = 0.05
 GRACE_S = 5.0
 NOT_STARTED = 127  # exit status of a shell for a program that it cannot start
 
@@ -29,14 +29,14 @@ def supervise(arguments: list[str]) -> int:
         print(f"{arguments[0]}: {error.strerror or error}", file=sys.stderr)
         return NOT_STARTED
     while program.poll() is None:
-        if select.select([sys.stdin], [], [], LOOK_EVERY_S)[
+        if select.select([sys.stdin], [], [], POLL_INTERVAL_S)[
             0
         ]:  # nothing is written into the pipe: readable means closed
-            end(program)
+            end_process_group(program)
     return program.returncode
 
 
-def end(program: subprocess.Popen[bytes]) -> None:
+def end_process_group(program: subprocess.Popen[bytes]) -> None:
     """End a program's process group: SIGTERM, wait 5 s, then SIGKILL."""
     for request in (signal.SIGTERM, signal.SIGKILL):
         with contextlib.suppress(ProcessLookupError):

@@ -19,21 +19,21 @@ from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, ConfigError
 from manitwin.formats.image_file import png_of
 from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
-from manitwin.models.generators.vendor import VendorGenerator, checked_address, is_name, number
+from manitwin.models.generators.vendor import VendorGenerator, checked_address, is_name, plausible_number
 from manitwin.models.services.http import FormFile
-from manitwin.models.services.refusal import Gone, Refusal, kind_of_status, refusal_by_status
+from manitwin.models.services.refusal import NotFound, Refusal, kind_of_status, refusal_by_status
 
 URL = "https://api.tripo3d.ai/v2/openapi"
 KEYS = ("TRIPO_API_KEY",)
 DEFAULT_MODEL = "v2.5-20250123"
 SEEDS = 1 << 31
 # these options produce FBX files, quantised meshes, and meshes without textures
-UNREADABLE = ("quad", "compress", "generate_parts")
+UNREADABLE_OPTIONS = ("quad", "compress", "generate_parts")
 # docs.tripo3d.ai/get-started/pricing.html, as archived in November 2026: image to textured model (a text costs 10 credits
 # less); "H2 / H3" there are the versions v2 and v3. $1 is 100 credits.
 CREDITS = {"v2.": 30, "v3.": 30, "P1-": 50}
-MORE_CREDITS = {("texture_quality", "detailed"): 10, ("smart_low_poly", True): 10}
-UNPRICED = ("geometry_quality",)
+OPTION_CREDITS = {("texture_quality", "detailed"): 10, ("smart_low_poly", True): 10}
+UNPRICED_OPTIONS = ("geometry_quality",)
 USD_PER_CREDIT = 0.01
 STATES = {"queued": "queued", "running": "running", "success": "done"}
 LINKS = ("pbr_model", "model", "base_model")
@@ -59,13 +59,13 @@ class TripoGenerator(VendorGenerator):
         listed_usd = _listed_usd(options) if url == URL else None
         super().__init__(model, url, key, config, sleep, listed_usd=listed_usd, refusal=refusal_of)
         self._options = options
-        wrong = [name for name in UNREADABLE if options.get(name)]
+        wrong = [name for name in UNREADABLE_OPTIONS if options.get(name)]
         if wrong:
             raise ConfigError(f"generator tripo: meshes of generate.options.{wrong[0]} cannot be read; leave it out")
 
     def probe(self) -> str:
         """Query the account's credits."""
-        balance = number(self._data(self._service.get_json("user/balance"), "balance")["balance"])
+        balance = plausible_number(self._data(self._service.get_json("user/balance"), "balance")["balance"])
         if balance is None:
             raise BadReply("tripo: its answer about the balance has no 'balance'")
         return f"{balance:g} credits left"
@@ -92,7 +92,7 @@ class TripoGenerator(VendorGenerator):
         if status in STATES:
             return JobState(STATES[status])  # type: ignore[arg-type]
         if status == "expired":
-            raise Gone("tripo: the task has expired")
+            raise NotFound("tripo: the task has expired")
         why = [str(task[name]) for name in ("error_code", "error_msg") if task.get(name)]
         if status == "banned":
             why.append("it violates the vendor's content policy")
@@ -134,7 +134,7 @@ def refusal_of(status: int, body: Any) -> Refusal | None:
 def _listed_usd(options: dict[str, Any]) -> float | None:
     """Return the maximum price of a job with these options by the vendor's list, None if the list does not cover them."""
     credits = next((n for prefix, n in CREDITS.items() if str(options["model_version"]).startswith(prefix)), None)
-    if credits is None or any(name in options for name in UNPRICED):
+    if credits is None or any(name in options for name in UNPRICED_OPTIONS):
         return None
-    more = sum(n for (name, value), n in MORE_CREDITS.items() if options.get(name) == value)
+    more = sum(n for (name, value), n in OPTION_CREDITS.items() if options.get(name) == value)
     return round((credits + more) * USD_PER_CREDIT, 2)

@@ -51,9 +51,9 @@ class VendorGenerator:
         refusal: Callable[[int, Any], Refusal | None] = refusal_by_status,
     ):
         self.model: str | None = model
-        self.usd_per_job = usd_per_job(self.priced_as(model), url, config.services, listed_usd)
+        self.usd_per_job = usd_per_job(self.price_label(model), url, config.services, listed_usd)
         self._options: dict[str, Any] = dict(config.generate.options)
-        self._service = self._served(url, key, config, sleep, refusal)
+        self._service = self._http_service(url, key, config, sleep, refusal)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.model!r}, {self._service.base_url!r})"
@@ -62,11 +62,11 @@ class VendorGenerator:
     def from_spec(cls, argument: str, config: BuildConfig) -> Self:
         """Create the generator from ``MODEL@URL``, both optional; raises ConfigError for a missing key or price."""
         said, given = split_url(argument)
-        url = address(given, cls.url)
-        model = chosen(cls.name, said, config, cls.model_option, cls.default_model)
+        url = service_url(given, cls.url)
+        model = choose_model(cls.name, said, config, cls.model_option, cls.default_model)
         return cls(model, url, key_from_environment(cls.keys, url, cls.name), config)
 
-    def priced_as(self, model: str) -> str:
+    def price_label(self, model: str) -> str:
         """Return the name used in the error about a missing price."""
         return self.name
 
@@ -74,7 +74,7 @@ class VendorGenerator:
         """Return the headers that carry the key."""
         return bearer(key)
 
-    def _served(
+    def _http_service(
         self,
         url: str,
         key: str | None,
@@ -111,14 +111,14 @@ def usd_per_job(name: str, url: str, services: ServicesConfig, listed: float | N
     )
 
 
-def address(url: str | None, vendors: str) -> str:
+def service_url(url: str | None, vendors: str) -> str:
     """Return the address of a service: the vendor's, or the given one, completed with the vendor's path if it has none."""
     if url is None:
         return vendors
     return url if urlsplit(url).path.strip("/") else url.rstrip("/") + urlsplit(vendors).path
 
 
-def chosen(name: str, said: str, config: BuildConfig, option: str, default: str) -> str:
+def choose_model(name: str, said: str, config: BuildConfig, option: str, default: str) -> str:
     """Return the model named by a spec or an option of the settings, else the default; raises ConfigError if both disagree."""
     set_to = config.generate.options.get(option)
     if said and set_to is not None and said != set_to:
@@ -150,7 +150,7 @@ def is_name(value: Any) -> bool:
     return isinstance(value, str) and 0 < len(value) <= LONGEST_ADDRESS and value.isprintable()
 
 
-def number(value: Any) -> float | None:
+def plausible_number(value: Any) -> float | None:
     """Return a value of an answer if it is a number of plausible size, else None."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not -LARGEST_NUMBER <= value <= LARGEST_NUMBER:
         return None

@@ -89,9 +89,9 @@ class GraspServer:
                 timeout_s=timeout_s,
                 max_bytes=MAX_REPLY_BYTES,
             )
-        except zmtp.NotConnected as error:
+        except zmtp.ZmtpConnectionError as error:
             raise Unavailable(f"{self.what}: nothing listens at {self.url}; start its server ({error})") from None
-        except zmtp.NotZmtp as error:
+        except zmtp.ZmtpProtocolError as error:
             raise BadReply(
                 f"{self.what}: the server at {self.url} cannot be used: {error}; check what runs there"
             ) from None

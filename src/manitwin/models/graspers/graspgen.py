@@ -17,7 +17,7 @@ from manitwin.errors import ConfigError, Unavailable
 from manitwin.models.graspers.grasp_server import GraspServer, said, server_url
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.served_proposals import ASKED_FOR, BASE_LINK_Z_M, HANDS, ask_for_proposals, point_cloud
-from manitwin.robots.grippers.gripper import Gripper, load_gripper, of_kind
+from manitwin.robots.grippers.gripper import Gripper, load_gripper, require_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 POINTS = 2000  # points that its client samples of a mesh (client-server/graspgen_client.py), as in training
@@ -50,7 +50,7 @@ class GraspGenGrasper:
         Raises Unavailable if the server does not answer or serves another hand, BadReply if its answer is unusable,
         ConfigError for a gripper without a model.
         """
-        gripper = of_kind(request.gripper, ParallelGripper)
+        gripper = require_kind(request.gripper, ParallelGripper)
         hand = _hand_of(gripper)
         self._require(hand)
         count = min(ASKED_FOR, request.max_proposals)

@@ -21,7 +21,7 @@ from manitwin.errors import BadReply, Unavailable
 from manitwin.models.graspers.grasp_server import GraspServer, said, server_url
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.served_proposals import ASKED_FOR, ask_for_proposals, point_cloud
-from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.gripper import require_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 POINTS = 3500  # points that its demo samples of a mesh (scripts/demo_object_mesh.py)
@@ -69,7 +69,7 @@ class GraspGenXGrasper:
 
         Raises Unavailable if the server does not answer, BadReply if its answer is unusable.
         """
-        gripper = of_kind(request.gripper, ParallelGripper)
+        gripper = require_kind(request.gripper, ParallelGripper)
         question = {
             "action": ACTION,
             "point_cloud": point_cloud(request, POINTS),

@@ -17,7 +17,7 @@ from manitwin.models.graspers.surface_sampling import (
     ROLLS,
     starting_points,
 )
-from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.gripper import require_kind
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper, Posture
 
 OPENING_STEP_M = 0.004  # openings are multiples of this, which limits the number of collision shapes
@@ -39,7 +39,7 @@ class PostureGrasper:
 
         The approach depth is, at random, the deepest that the palm allows or a value between that and the fingertips.
         """
-        hand = of_kind(request.gripper, MultiFingerGripper)
+        hand = require_kind(request.gripper, MultiFingerGripper)
         rng = np.random.default_rng(request.seed)
         points, normals = starting_points(request, max(1, request.max_proposals // ROLLS), rng)
         caster = request.surface

@@ -106,7 +106,7 @@ class Grasper(Protocol):
 
 
 @dataclass(frozen=True)
-class Screened:
+class ScreenedProposals:
     """Remaining proposals with measured widths, their merits, and the number of proposals left after each filter."""
 
     proposals: GraspProposals
@@ -117,7 +117,7 @@ class Screened:
 class Screen(Protocol):
     """Protocol of a filter of proposals for one object and one kind of gripper, before any physics trial."""
 
-    def __call__(self, raw: GraspProposals) -> Screened:
+    def __call__(self, raw: GraspProposals) -> ScreenedProposals:
         """Return the proposals that are worth a trial."""
         ...
 

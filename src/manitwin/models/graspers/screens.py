@@ -9,14 +9,14 @@ import numpy as np
 from manitwin.errors import Rejected
 from manitwin.geometry.antipodal import antipodal_pairs
 from manitwin.geometry.sampling import sample_surface
-from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screened
+from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, ScreenedProposals
 from manitwin.physics.grasp_filters import GraspFilter, pad_merits
 from manitwin.physics.grasp_selection import Merits
 from manitwin.physics.pad_loads import PEAK_SLIDE_ACCELERATION_M_S2, PressedPads, jams, load_share
 from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.physics.trial_phases import SLIDE_DIRECTIONS
-from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.gripper import require_kind
 from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.parallel import ParallelGripper
@@ -39,12 +39,12 @@ class PadScreen:
     """Screen for parallel grippers: the pads touch well and bear the load, and the open gripper is free of collisions."""
 
     def __init__(self, request: GraspRequest):
-        self._request, self._gripper = request, of_kind(request.gripper, ParallelGripper)
+        self._request, self._gripper = request, require_kind(request.gripper, ParallelGripper)
         # PhysX combines the friction of two materials by their mean
         self._friction = (self._gripper.finger_friction + request.object_friction) / 2
         self._passes = GraspFilter(self._gripper, request.hulls, request.center_of_mass_m, self._friction)
 
-    def __call__(self, raw: GraspProposals) -> Screened:
+    def __call__(self, raw: GraspProposals) -> ScreenedProposals:
         """Return the proposals that pass, with the widths measured at the pads."""
         left = self._passes(raw.gripper_to_object)
         proposals = replace(raw.take(left.index), width_m=left.contacts.width_m)
@@ -60,7 +60,7 @@ class PadScreen:
             "after_load": len(borne),
         }
         merits = pad_merits(contacts.take(borne), share[borne], jammed[borne])
-        return Screened(proposals.take(borne), merits, counts)
+        return ScreenedProposals(proposals.take(borne), merits, counts)
 
     def _load(self, pads: PressedPads, gripper_to_object: np.ndarray, *, flat: bool = True) -> np.ndarray:
         """Return the load ratio ``(N,)`` of grasps ``(N, 4, 4)``: required over available pad wrench.
@@ -114,11 +114,11 @@ class SealScreen:
     """Screen for suction cups: the lip seals, and the gripper does not collide with the object."""
 
     def __init__(self, request: GraspRequest):
-        self._request, self._gripper = request, of_kind(request.gripper, SuctionGripper)
+        self._request, self._gripper = request, require_kind(request.gripper, SuctionGripper)
         self._friction = (self._gripper.finger_friction + request.object_friction) / 2
         self._surface, self._collision = request.surface, HandCollision(request.hulls)
 
-    def __call__(self, raw: GraspProposals) -> Screened:
+    def __call__(self, raw: GraspProposals) -> ScreenedProposals:
         """Return the proposals that seal; their cost is the load relative to the lip's limits."""
         found = seal(self._gripper, raw.gripper_to_object, self._surface)
         sealed = np.flatnonzero(found.sealed)
@@ -128,7 +128,7 @@ class SealScreen:
         left = sealed[~overlaps]
         load = self._load(found.center_m[left], found.inward[left])
         counts = {"raw": len(raw), "after_seal": len(sealed), "after_collision": len(left)}
-        return Screened(raw.take(left), Merits(load <= 1, load > 1, load, GOOD_LOAD), counts)
+        return ScreenedProposals(raw.take(left), Merits(load <= 1, load > 1, load, GOOD_LOAD), counts)
 
     def _load(self, center_m: np.ndarray, inward: np.ndarray) -> np.ndarray:
         """Return the load ratio ``(N,)``: the maximum over weight and slides of the required share of the lip's limits."""
@@ -155,10 +155,10 @@ class HandScreen:
     """Screen for multi-finger hands: the open hand does not collide with the object."""
 
     def __init__(self, request: GraspRequest):
-        self._request, self._hand = request, of_kind(request.gripper, MultiFingerGripper)
+        self._request, self._hand = request, require_kind(request.gripper, MultiFingerGripper)
         self._collision = HandCollision(request.hulls)
 
-    def __call__(self, raw: GraspProposals) -> Screened:
+    def __call__(self, raw: GraspProposals) -> ScreenedProposals:
         """Return the collision-free proposals; their cost is the lever arm that friction needs to bear weight and slides."""
         free = ~self._overlaps(raw)
         left = raw.take(np.flatnonzero(free))
@@ -166,7 +166,9 @@ class HandScreen:
         needed_nm = self._request.mass_kg * (GRAVITY_M_S2 + PEAK_SLIDE_ACCELERATION_M_S2) * self._lever_m(left)
         arm_m = needed_nm / (friction * self._hand.force_n)
         weak = arm_m > WEAK_ARM_M
-        return Screened(left, Merits(~weak, weak, arm_m, GOOD_ARM_M), {"raw": len(raw), "after_collision": len(left)})
+        return ScreenedProposals(
+            left, Merits(~weak, weak, arm_m, GOOD_ARM_M), {"raw": len(raw), "after_collision": len(left)}
+        )
 
     def _lever_m(self, grasps: GraspProposals) -> np.ndarray:
         """Return the distance ``(N,)`` of the centre of mass from the segment between the contacts."""

@@ -10,7 +10,7 @@ from manitwin.geometry.antipodal import AntipodalPairs, antipodal_pairs, grasp_f
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.physics.suction import seal
-from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.gripper import require_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.grippers.suction import SuctionGripper
 
@@ -47,7 +47,7 @@ def _density(request: GraspRequest, points: np.ndarray) -> np.ndarray:
     """Return the relative probability ``(N,)`` of drawing each surface point; zero beyond ``within_m`` of the focus points."""
     weight, reached = np.ones(len(points)), np.ones(len(points), bool)
     if len(request.focus_points_m):
-        distance = _to_nearest_m(points, request.focus_points_m)
+        distance = _nearest_distance_m(points, request.focus_points_m)
         weight += FOCUS_WEIGHT * np.exp(-0.5 * (distance / FOCUS_SPREAD_M) ** 2)
         reached = distance <= (np.inf if request.within_m is None else request.within_m)
     spread_m = CENTER_SPREAD * float(np.linalg.norm(request.solid.extents))
@@ -57,7 +57,7 @@ def _density(request: GraspRequest, points: np.ndarray) -> np.ndarray:
     return weight
 
 
-def _to_nearest_m(points: np.ndarray, others: np.ndarray) -> np.ndarray:
+def _nearest_distance_m(points: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return the distance ``(N,)`` of each of ``points (N, 3)`` to the nearest of ``others (M, 3)``."""
     if len(others) > FEW:
         return np.asarray(cKDTree(others).query(points)[0])
@@ -83,7 +83,7 @@ class AntipodalGrasper:
         of mass.
         """
         rng = np.random.default_rng(request.seed)
-        gripper = of_kind(request.gripper, ParallelGripper)
+        gripper = require_kind(request.gripper, ParallelGripper)
         friction = (gripper.finger_friction + request.object_friction) / 2 / CONE_SAFETY
         points, normals = starting_points(request, max(1, request.max_proposals // ROLLS), rng)
         pairs = antipodal_pairs(
@@ -125,7 +125,7 @@ class SuctionGrasper:
 
     def propose(self, request: GraspRequest) -> GraspProposals:
         """Return up to ``max_proposals`` grasps in random order; the score decreases with the lever arm of the centre of mass."""
-        cup = of_kind(request.gripper, SuctionGripper)
+        cup = require_kind(request.gripper, SuctionGripper)
         rng = np.random.default_rng(request.seed)
         points, normals = starting_points(request, max(1, request.max_proposals // CUP_ROLLS), rng)
         rolls = rng.uniform(0, 2 * np.pi, (len(points), CUP_ROLLS))

@@ -23,11 +23,11 @@ _PIECE_BYTES = 65536
 RETRY_S = 0.05
 
 
-class NotZmtp(Exception):
+class ZmtpProtocolError(Exception):
     """The peer violates the protocol or exceeds the size limit; the message is meant for the user."""
 
 
-class NotConnected(Exception):
+class ZmtpConnectionError(Exception):
     """No connection could be made, so nothing was sent; the message says why."""
 
 
@@ -54,7 +54,7 @@ def _connected(url: str, timeout_s: float) -> socket.socket:
     try:
         addresses = addresses_of(host, port, timeout_s)
     except OSError as error:
-        raise NotConnected(str(error)) from None
+        raise ZmtpConnectionError(str(error)) from None
     while (left := until - time.monotonic()) > 0:
         for address in addresses:
             try:
@@ -62,7 +62,7 @@ def _connected(url: str, timeout_s: float) -> socket.socket:
             except OSError as error:
                 failure = error.strerror or str(error)
         time.sleep(min(RETRY_S, left))
-    raise NotConnected(failure)
+    raise ZmtpConnectionError(failure)
 
 
 class _Peer:
@@ -76,14 +76,14 @@ class _Peer:
         self._write(_GREETING)
         greeting = self._read(64)
         if greeting[:1] != b"\xff" or greeting[9:10] != b"\x7f" or greeting[10] < 3:
-            raise NotZmtp("it does not speak ZeroMQ (ZMTP 3)")
+            raise ZmtpProtocolError("it does not speak ZeroMQ (ZMTP 3)")
         mechanism = greeting[12:32].rstrip(b"\x00")
         if mechanism != b"NULL":
-            raise NotZmtp("it asks for keys (ZeroMQ CURVE or PLAIN), which these servers do not")
+            raise ZmtpProtocolError("it asks for keys (ZeroMQ CURVE or PLAIN), which these servers do not")
         self.send(_READY, COMMAND)
         flags, body = self._frame()
         if not flags & COMMAND or not body.startswith(b"\x05READY"):
-            raise NotZmtp("it refuses the connection")
+            raise ZmtpProtocolError("it refuses the connection")
 
     def send(self, body: bytes, flags: int = 0) -> None:
         """Send a frame."""
@@ -103,20 +103,20 @@ class _Peer:
             if len(parts) > 2:
                 break
         if len(parts) != 2 or parts[0][1]:
-            raise NotZmtp("its answer has not one part")
+            raise ZmtpProtocolError("its answer has not one part")
         return parts[1][1]
 
     def _frame(self) -> tuple[int, bytes]:
         flags = self._read(1)[0]
         if flags > LONG | COMMAND | MORE:
-            raise NotZmtp("it does not speak ZeroMQ (ZMTP 3)")
+            raise ZmtpProtocolError("it does not speak ZeroMQ (ZMTP 3)")
         length = struct.unpack(">Q", self._read(8))[0] if flags & LONG else self._read(1)[0]
         return flags, self._read(length)
 
     def _read(self, length: int) -> bytes:
         self._left -= length + 1  # counts empty frames too
         if self._left < 0:
-            raise NotZmtp(f"its answer has more than {self._max} bytes")
+            raise ZmtpProtocolError(f"its answer has more than {self._max} bytes")
         data = bytearray()
         while len(data) < length:
             self._wait()

@@ -15,7 +15,7 @@ import numpy as np
 
 from manitwin.errors import ConfigError
 from manitwin.formats.json_file import parse_json_object
-from manitwin.models.matting.candidates import Candidate, alike, at_size, doubts, misjudged
+from manitwin.models.matting.candidates import Candidate, alike, disputed_share, network_doubts, resize_share
 from manitwin.models.matting.confidence import MOST_ZOOM
 from manitwin.models.matting.outline import eroded
 
@@ -53,8 +53,8 @@ def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -
     ``share`` may have any size. Of the other candidates only the one most similar to this candidate counts.
     """
     mask = candidate.found.mask
-    share = at_size(share, mask.shape)
-    unsure, within, beyond = doubts(share, mask)
+    share = resize_share(share, mask.shape)
+    unsure, within, beyond = network_doubts(share, mask)
     bulk_px = float(mask.sum() / max(int((mask & ~eroded(mask, 1)).sum()), 1)) * min(candidate.zoom, MOST_ZOOM)
     scores = asdict(candidate.scores)
     rivals = [alike(mask, other.found.mask) for other in others]
@@ -70,7 +70,7 @@ def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -
         [
             *(np.log(max(scores[name], LEAST)) for name in SCORES),
             *(opinions[name] for name in OPINIONS),
-            -min(misjudged(candidate, others, share) / MOST_MISJUDGED, 1.0),
+            -min(disputed_share(candidate, others, share) / MOST_MISJUDGED, 1.0),
             min(0.0, float(np.log(bulk_px / BULKY))),
             float(not candidate.by_network),
         ]
@@ -83,12 +83,12 @@ def _difference(share: float) -> float:
 
 
 def probability(values: np.ndarray) -> float:
-    """Return the probability in [0, 1] that a mask with these ``features`` is right: the fitted model times ``unfitted``."""
+    """Return the probability in [0, 1] that a mask with these ``features`` is right: the model times ``unfitted_factor``."""
     bias, weights = _weights()
-    return float(unfitted(values) / (1 + np.exp(-np.clip(bias + weights @ values, -30, 30))))
+    return float(unfitted_factor(values) / (1 + np.exp(-np.clip(bias + weights @ values, -30, 30))))
 
 
-def unfitted(values: np.ndarray) -> float:
+def unfitted_factor(values: np.ndarray) -> float:
     """Return the factor in [0, 1] of two doubts that are too rare in the composites to be fitted.
 
     They are ``kept`` (a part in focus may be lost, or a hole filled) and ``solid`` (background may be visible through the
@@ -97,7 +97,7 @@ def unfitted(values: np.ndarray) -> float:
     return float((1 + values[FEATURES.index("kept")]) * np.exp(values[FEATURES.index("solid")]))
 
 
-def doubts_of(values: np.ndarray) -> dict[str, float]:
+def log_odds_costs(values: np.ndarray) -> dict[str, float]:
     """Return the cost in log-odds of each feature except ``made_by_rules``, compared with the feature's best value."""
     _, weights = _weights()
     doubts = dict(zip(FEATURES[:-1], (weights * (BEST - values))[:-1].tolist(), strict=True))

@@ -12,7 +12,7 @@ from scipy import ndimage
 
 from manitwin.models.matting.confidence import MatteScores, score
 from manitwin.models.matting.outline import dilated, eroded, opened
-from manitwin.models.matting.segmentation import MOSTLY_NARROW, Segmentation, without_specks
+from manitwin.models.matting.segmentation import MOSTLY_NARROW, Segmentation, remove_specks
 
 Maker = Literal["rules", "network", "second_network", "built_in_network", "both"]
 """Source of a candidate mask.
@@ -80,7 +80,7 @@ def candidates(found: Segmentation, shares: Sequence[np.ndarray], *, zoom: float
             if maker == "network" and joined.sum() > (1 + LEAST_ADDED) * learned.sum():
                 whole = replace(seen, mask=joined, shadow=seen.shadow & ~joined, hard=seen.hard & ~joined)
                 masks.append(("both", whole))
-    least = np.min([at_size(share, found.mask.shape) for share in shares], axis=0) if shares else None
+    least = np.min([resize_share(share, found.mask.shape) for share in shares], axis=0) if shares else None
     return [
         Candidate(maker, each, score(each, zoom=zoom, share=least), zoom)
         for maker, each in masks
@@ -107,7 +107,7 @@ def completed(share: np.ndarray, found: Segmentation, *, exact: bool = False) ->
     one digital colour such pixels are object wherever they are, without an enclosing outline, since the network may miss the
     whole object.
     """
-    share = at_size(share, found.mask.shape)
+    share = resize_share(share, found.mask.shape)
     within = eroded(found.mask if exact else ndimage.binary_fill_holes(share > ENCLOSING), 2)
     told = opened(within & found.mask & found.colours.certain, 1)
     return np.asarray(np.where(told, 1.0, share), np.float32)
@@ -118,11 +118,11 @@ def network_mask(share: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
     The mask is empty if there are fewer than ``LEAST_PIXELS``.
     """
-    mask = at_size(share, shape) > 0.5
-    return without_specks(mask) if mask.sum() >= LEAST_PIXELS else np.zeros(shape, bool)
+    mask = resize_share(share, shape) > 0.5
+    return remove_specks(mask) if mask.sum() >= LEAST_PIXELS else np.zeros(shape, bool)
 
 
-def at_size(share: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def resize_share(share: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Scale a network's foreground probability to a mask's ``shape`` (H, W)."""
     return np.asarray(cv2.resize(share, shape[::-1], interpolation=cv2.INTER_AREA))
 
@@ -136,7 +136,7 @@ def alike(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.clip(1 - opened(one ^ other, 2).sum() / both, 0, 1)) if both else 0.0
 
 
-def misjudged(candidate: Candidate, others: list[Candidate], share: np.ndarray) -> float:
+def disputed_share(candidate: Candidate, others: list[Candidate], share: np.ndarray) -> float:
     """Return the area that other masks judge differently and whose outline is in focus, as a share of the candidate's area.
 
     Such a region is a piece that another mask has and the candidate lacks, or a hole of another mask that the candidate
@@ -191,7 +191,7 @@ def lost_parts(mask: np.ndarray, found: Segmentation, share: np.ndarray) -> np.n
 
 def _shade(found: Segmentation, share: np.ndarray) -> Callable[[tuple[slice, slice], np.ndarray], bool]:
     """Return a predicate that tells whether a piece in its box is shaded background: darker, not coloured, and no object."""
-    seen, certain = at_size(share, found.mask.shape), found.colours.certain
+    seen, certain = resize_share(share, found.mask.shape), found.colours.certain
     darker = found.background.light < 1
 
     def is_shade(box: tuple[slice, slice], piece: np.ndarray) -> bool:
@@ -223,7 +223,7 @@ def _pieces(mask: np.ndarray) -> Iterator[tuple[tuple[slice, slice], np.ndarray]
         yield box, labels[box] == index
 
 
-def doubts(share: np.ndarray, mask: np.ndarray) -> tuple[float, float, float]:
+def network_doubts(share: np.ndarray, mask: np.ndarray) -> tuple[float, float, float]:
     """Return how uncertain a network is and how much it objects to a mask: (unsure, within, beyond) as shares of the mask's area.
 
     ``share`` (H, W) is the network's foreground probability. ``unsure`` counts pixels between certain object and certain

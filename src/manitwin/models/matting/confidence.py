@@ -9,7 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from manitwin.models.matting.background import Background, connected_to, length
-from manitwin.models.matting.ground_inside import ground_inside
+from manitwin.models.matting.enclosed_background import enclosed_background_share
 from manitwin.models.matting.hard_shadow import PENUMBRA_PX, edge_width_px
 from manitwin.models.matting.outline import dilated, disk, eroded, opened
 from manitwin.models.matting.segmentation import Segmentation
@@ -58,13 +58,13 @@ class MatteScores:
     thick: float
 
     @property
-    def of_one_whole(self) -> bool:
+    def is_whole_object(self) -> bool:
         """Whether the mask shows one whole object: one connected piece, no other objects, not cut by the frame."""
         return min(self.complete, self.whole, self.uncut) >= LOW_SCORE
 
 
 def score(segmentation: Segmentation, *, zoom: float = 1.0, share: np.ndarray | None = None) -> MatteScores:
-    """Score a non-empty mask; ``zoom`` is the size of the photo over that of the mask, ``share`` is as in ``ground_inside``."""
+    """Score a non-empty mask; ``zoom`` is photo size over mask size, ``share`` is as in ``enclosed_background_share``."""
     mask, background = segmentation.mask, segmentation.background
     outline = mask & ~eroded(mask, 1)
     border = border_of(mask.shape)
@@ -85,23 +85,25 @@ def score(segmentation: Segmentation, *, zoom: float = 1.0, share: np.ndarray | 
     strips = shade_strips(background, mask, segmentation.gradient)
     outlined, beyond = _in_focus(segmentation, outline)
     # although two opinions differ, the mask is settled if its outline has all edges in focus and none lie beside it
-    settled = _ramp(outlined, 0.92, 0.99) * _ramp(-beyond, -0.3, -0.05)
+    settled = _linear_score(outlined, 0.92, 0.99) * _linear_score(-beyond, -0.3, -0.05)
     return MatteScores(
-        on_edges=_ramp(on_edges, 0.4, 0.9),
-        crisp=_ramp(float(np.median(sharpest[free])) / typical if free.any() else 0.0, 0.15, 0.5),
-        separable=_ramp(hit - false, 0.1, 0.7),
-        complete=_ramp(1 - _left_over(segmentation) / mask.sum(), 0.3, 0.9),
-        uncut=_ramp(-float((mask & border).sum()) / 2 / _longest(mask), -0.06, -0.01),
-        stable=max(_ramp(segmentation.agreement, 0.6, 0.95), settled),
-        whole=_ramp(float(areas.max() / areas.sum()), 0.9, 1.0),
-        plain=_ramp(-background.noise_lab - 20 * background.unexplained, -12, -3),
-        outermost=_ramp(-_overshadowed(segmentation, outline), -0.25, -0.05),
-        sharply_bounded=_ramp(-_softly_bounded(segmentation, outline), -0.4, -0.15),
-        unshaded=_ramp(-float((strips.shadow | strips.doubtful).sum() / mask.sum()), -0.05, -0.01),
-        solid=_ramp(
-            -ground_inside(background, mask, segmentation.gradient, segmentation.edge_threshold, share), -0.008, -0.002
+        on_edges=_linear_score(on_edges, 0.4, 0.9),
+        crisp=_linear_score(float(np.median(sharpest[free])) / typical if free.any() else 0.0, 0.15, 0.5),
+        separable=_linear_score(hit - false, 0.1, 0.7),
+        complete=_linear_score(1 - _unmasked_object_area(segmentation) / mask.sum(), 0.3, 0.9),
+        uncut=_linear_score(-float((mask & border).sum()) / 2 / _longest(mask), -0.06, -0.01),
+        stable=max(_linear_score(segmentation.agreement, 0.6, 0.95), settled),
+        whole=_linear_score(float(areas.max() / areas.sum()), 0.9, 1.0),
+        plain=_linear_score(-background.noise_lab - 20 * background.unexplained, -12, -3),
+        outermost=_linear_score(-_shaded_outline_share(segmentation, outline), -0.25, -0.05),
+        sharply_bounded=_linear_score(-_softly_bounded(segmentation, outline), -0.4, -0.15),
+        unshaded=_linear_score(-float((strips.shadow | strips.doubtful).sum() / mask.sum()), -0.05, -0.01),
+        solid=_linear_score(
+            -enclosed_background_share(background, mask, segmentation.gradient, segmentation.edge_threshold, share),
+            -0.008,
+            -0.002,
         ),
-        thick=_ramp(-outline.sum() / mask.sum() / min(zoom, MOST_ZOOM), -0.25, -0.12),
+        thick=_linear_score(-outline.sum() / mask.sum() / min(zoom, MOST_ZOOM), -0.25, -0.12),
     )
 
 
@@ -133,7 +135,7 @@ def _along_frame(picture: np.ndarray) -> np.ndarray:
     return np.concatenate([inner[0], inner[1:, -1], inner[-1, -2::-1], inner[-2:0:-1, 0]])
 
 
-def _overshadowed(segmentation: Segmentation, outline: np.ndarray) -> float:
+def _shaded_outline_share(segmentation: Segmentation, outline: np.ndarray) -> float:
     """Return the share of the outline with an edge beyond it, in the adjacent shade, that is at least 0.7 times as sharp.
 
     A shadow's edge is softer than the outline of the object that casts it, so a sharp edge there is the rim of a grey or
@@ -176,7 +178,7 @@ def _in_focus(segmentation: Segmentation, outline: np.ndarray) -> tuple[float, f
     return float(dilated(narrow, 3)[outline].mean()), float((narrow & beside).sum() / outline.sum())
 
 
-def _left_over(segmentation: Segmentation) -> float:
+def _unmasked_object_area(segmentation: Segmentation) -> float:
     """Return the area of other objects outside the mask: neither background nor shadow, or edges inside a shadow."""
     background = segmentation.background
     away = ~dilated(segmentation.mask, 5) & ~background.seam
@@ -198,6 +200,6 @@ def _longest(mask: np.ndarray) -> int:
     return int(max(np.ptp(rows), np.ptp(columns))) + 1
 
 
-def _ramp(value: float, worst: float, best: float) -> float:
+def _linear_score(value: float, worst: float, best: float) -> float:
     """Map ``value`` linearly to [0, 1], from ``worst`` to ``best``, with clipping."""
     return float(np.clip((value - worst) / (best - worst), 0, 1))

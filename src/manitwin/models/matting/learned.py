@@ -16,13 +16,13 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from manitwin.errors import BadReply, UsageError, choose_from
+from manitwin.errors import BadReply, UsageError, unknown_name_message
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
 from manitwin.formats.onnx_file import MAX_ONNX_BYTES, OnnxFile, parse_onnx
 from manitwin.formats.printable import printable_line
 from manitwin.models.weights.catalog import KNOWN_WEIGHTS
-from manitwin.models.weights.store import read_stored, stored
+from manitwin.models.weights.store import find_stored, read_stored
 
 Scaling = Literal["half", "imagenet"]
 SCALINGS: dict[Scaling, tuple[np.ndarray, np.ndarray]] = {
@@ -88,8 +88,8 @@ def find_network(name: str) -> Network:
             path.stem, path.absolute(), content, source=f"file:{path.name}", licence="as its user said: none"
         )
     if name not in KNOWN_WEIGHTS:
-        raise UsageError(choose_from("matting", name, [NONE, *KNOWN_WEIGHTS]) + f", or an {SUFFIX} file")
-    added = stored(name)
+        raise UsageError(unknown_name_message("matting", name, [NONE, *KNOWN_WEIGHTS]) + f", or an {SUFFIX} file")
+    added = find_stored(name)
     if added is None:
         raise UsageError(
             f"matting {name!r}: its weights are not installed; install them with manitwin models add {name}"

@@ -13,13 +13,13 @@ from scipy import ndimage
 
 from manitwin.config import MattingConfig
 from manitwin.errors import Rejected
-from manitwin.geometry.pixel_boxes import PixelBox, to_picture
-from manitwin.models.matting.causes import CAUSES, REMEDY, told
+from manitwin.geometry.pixel_boxes import PixelBox, crop_to_image_box
 from manitwin.models.matting.confidence import border_of
-from manitwin.models.matting.explained import Explains, explained_first
 from manitwin.models.matting.learned import Network
-from manitwin.models.matting.outline import dilated, without_small_holes
-from manitwin.models.matting.study import Judged, Study, largest_piece, study_in_turn
+from manitwin.models.matting.outline import dilated, fill_small_holes
+from manitwin.models.matting.rejection_causes import CAUSES, REMEDY, told
+from manitwin.models.matting.study import ScoredCandidate, Study, largest_piece, study_in_turn
+from manitwin.models.matting.template_confirmation import Explains, prefer_explained
 from manitwin.models.matting.trimmed import trimmed_margin
 
 TRANSPARENT_SHARE = 0.02
@@ -58,7 +58,7 @@ class Matte:
     agreement: dict[str, float] = field(default_factory=dict)
 
 
-class DoubtedCutOut(Rejected):
+class DoubtfulMatte(Rejected):
     """Rejection of a mask whose confidence is too low; ``matte`` is the rejected matte."""
 
     def __init__(self, reason: str, detail: str, matte: Matte):
@@ -89,7 +89,7 @@ def matte_photo(
     if no candidate is accepted without them. The candidate with the highest confidence is chosen, by its scores and its
     agreement with the other opinions. ``method`` is ``network`` for a mask that a network produced. For a mask of the rules
     it is ``flat_border`` where smooth surfaces explain the border, else ``grabcut``. If no candidate reaches
-    ``min_confidence`` and ``explains`` is given, a candidate whose outline it confirms may be accepted (``explained_first``).
+    ``min_confidence`` and ``explains`` is given, a candidate whose outline it confirms may be accepted (``prefer_explained``).
     ``window_px`` is the box of the whole photo that ``image`` shows, in pixels of the photo; if given, the message about
     separate objects lists their boxes in the photo.
 
@@ -101,9 +101,9 @@ def matte_photo(
     rgb = np.ascontiguousarray(image[..., :3])
     study = study_in_turn(rgb, networks, min_confidence=min_confidence, working_side_px=working_side_px)
     if explains is not None and study.confidence < min_confidence:
-        study = explained_first(rgb, study, explains, min_confidence=min_confidence, working_side_px=working_side_px)
+        study = prefer_explained(rgb, study, explains, min_confidence=min_confidence, working_side_px=working_side_px)
     try:
-        decided(
+        accept_candidate(
             study,
             name,
             min_confidence=min_confidence,
@@ -114,7 +114,7 @@ def matte_photo(
     except Rejected as answer:
         if answer.reason == "no_object" or not study.judged:
             raise
-        raise DoubtedCutOut(answer.reason, answer.detail, _matte_of(rgb, study)) from None
+        raise DoubtfulMatte(answer.reason, answer.detail, _matte_of(rgb, study)) from None
     return _matte_of(rgb, study)
 
 
@@ -131,7 +131,7 @@ def _matte_of(rgb: np.ndarray, study: Study) -> Matte:
     )
 
 
-def decided(
+def accept_candidate(
     study: Study,
     name: str,
     *,
@@ -139,7 +139,7 @@ def decided(
     min_area_share: float = 0.002,
     second_object_share: float = 0.12,
     window_px: PixelBox | None = None,
-) -> Judged:
+) -> ScoredCandidate:
     """Return the accepted candidate of a study; raises Rejected as ``matte_photo`` if none is accepted."""
     if not study.judged or study.judged[0].candidate.found.mask.mean() < min_area_share:
         if not study.plain:
@@ -162,7 +162,7 @@ def _given_matte(
         raise Rejected("no_object", f"{name}: its alpha channel is empty; export it with the object opaque", "generate")
     _reject_several(name, mask, second_object_share, window_px)
     # a cut-out tool may remove specular highlights, which leaves small holes in the mask
-    closed = largest_piece(without_small_holes(mask))
+    closed = largest_piece(fill_small_holes(mask))
     alpha = np.where(closed & ~mask, 255, np.where(dilated(closed, 2), image[..., 3], 0)).astype(np.uint8)
     # Colours under transparent pixels are arbitrary, and those along the outline are mixed with the former background: both are
     # replaced by the nearest opaque colour. Half-transparent areas farther inside, such as glass, keep their colours.
@@ -186,11 +186,11 @@ def _rounded_down(confidence: float) -> float:
 
 
 def _reject_doubtful(
-    name: str, judged: Judged, min_confidence: float, second_object_share: float, window_px: PixelBox | None
+    name: str, judged: ScoredCandidate, min_confidence: float, second_object_share: float, window_px: PixelBox | None
 ) -> None:
     """Raise Rejected for separate objects or a confidence below ``min_confidence``."""
     found = judged.candidate.found
-    if judged.of_pieces >= min(min_confidence, LIKELY):
+    if judged.pieces_confidence >= min(min_confidence, LIKELY):
         _reject_several(name, found.mask, second_object_share, window_px)
     if judged.confidence < min_confidence:
         raise Rejected(
@@ -208,7 +208,7 @@ def _reject_several(name: str, mask: np.ndarray, second_object_share: float, win
     large = stats[1:][areas >= second_object_share * areas.max()]
     large = large[np.argsort(large[:, cv2.CC_STAT_LEFT], kind="stable")]
     if len(large) > 1:
-        boxes = [] if window_px is None else [_in_photo(piece, mask.shape, window_px) for piece in large]
+        boxes = [] if window_px is None else [_photo_box_text(piece, mask.shape, window_px) for piece in large]
         shown = " or ".join(f"--box {box}" for box in boxes[:MOST_BOXES]) + (
             " or ..." if len(boxes) > MOST_BOXES else ""
         )
@@ -219,7 +219,7 @@ def _reject_several(name: str, mask: np.ndarray, second_object_share: float, win
         )
 
 
-def _in_photo(piece: np.ndarray, shape: tuple[int, ...], window_px: PixelBox) -> str:
+def _photo_box_text(piece: np.ndarray, shape: tuple[int, ...], window_px: PixelBox) -> str:
     """Return the box of a piece in pixels of the photo, as text.
 
     ``piece`` is x, y, width and height in a mask of this ``shape``.
@@ -227,15 +227,15 @@ def _in_photo(piece: np.ndarray, shape: tuple[int, ...], window_px: PixelBox) ->
     left, top, right, bottom = window_px
     x, y, width, height = (float(piece[i]) for i in range(4))
     scale = shape[1] / (right - left), shape[0] / (bottom - top)
-    return ",".join(f"{edge:.0f}" for edge in to_picture((x, y, x + width, y + height), window_px, scale))
+    return ",".join(f"{edge:.0f}" for edge in crop_to_image_box((x, y, x + width, y + height), window_px, scale))
 
 
-def _findings(chosen: Judged) -> list[str]:
+def _findings(chosen: ScoredCandidate) -> list[str]:
     """Return the findings about an accepted mask."""
     scores, found, findings = chosen.candidate.scores, chosen.candidate.found, []
     if chosen.is_explained:
         findings.append(
-            f"doubtful by itself ({chosen.by_itself:.2f}), but its outline is that of the thing it is said to be"
+            f"doubtful by itself ({chosen.photo_confidence:.2f}), but its outline is that of the thing it is said to be"
         )
     if scores.uncut < 1:
         findings.append("the image border touches the object")

@@ -49,11 +49,14 @@ def object_share(rgb: np.ndarray) -> np.ndarray:
     """
     # not cached: a network with its buffers takes 85 MB, parsing it takes 0.02 CPU-s
     network = cv2.dnn.readNetFromONNX(np.frombuffer(_content(), np.uint8))
-    looks = [in_two_looks(rgb, partial(_seen, network, side_px=side, mirrored=mirrored)) for side, mirrored in WAYS]
+    looks = [
+        evaluate_coarse_to_fine(rgb, partial(_network_share, network, side_px=side, mirrored=mirrored))
+        for side, mirrored in WAYS
+    ]
     return np.asarray(np.mean(looks, axis=0), np.float32)
 
 
-def in_two_looks(rgb: np.ndarray, look: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+def evaluate_coarse_to_fine(rgb: np.ndarray, look: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """Evaluate ``look`` on a picture and, for a small object, again on an enlarged crop around it; return (H, W) in [0, 1]."""
     share = look(rgb)
     rows, columns = np.nonzero(share > LEAST_SHARE)
@@ -71,7 +74,7 @@ def in_two_looks(rgb: np.ndarray, look: Callable[[np.ndarray], np.ndarray]) -> n
     return joined
 
 
-def _seen(network: cv2.dnn.Net, rgb: np.ndarray, side_px: int, mirrored: bool) -> np.ndarray:
+def _network_share(network: cv2.dnn.Net, rgb: np.ndarray, side_px: int, mirrored: bool) -> np.ndarray:
     shrinks = max(rgb.shape[:2]) > side_px
     picture = cv2.resize(rgb, (side_px, side_px), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
     picture = picture[:, ::-1] if mirrored else picture

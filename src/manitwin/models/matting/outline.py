@@ -51,7 +51,7 @@ def _dilated_by_rows(mask: np.ndarray, radius: int) -> np.ndarray:
     return found
 
 
-def without_small_holes(mask: np.ndarray) -> np.ndarray:
+def fill_small_holes(mask: np.ndarray) -> np.ndarray:
     """Fill holes smaller than 0.2 % of a mask."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats((~mask).astype(np.uint8), connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] < 2e-3 * mask.sum()
@@ -98,7 +98,7 @@ def edges(background: Background, gradient: np.ndarray, threshold: float) -> np.
     return strong[labels]
 
 
-def flood(free: np.ndarray, seed: np.ndarray, ball_px: int, regrow_px: int) -> np.ndarray:
+def flood_region(free: np.ndarray, seed: np.ndarray, ball_px: int, regrow_px: int) -> np.ndarray:
     """Flood ``free`` from ``seed`` with a ball that cannot pass gaps narrower than itself, then fill up to the walls.
 
     The picture is extended beyond its frame with its border values, so that the ball can enter between an object and the

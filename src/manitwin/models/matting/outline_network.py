@@ -52,7 +52,7 @@ def share_near_outline(rgb: np.ndarray, mask: np.ndarray, band_px: int) -> np.nd
         max(0, rows.min() - margin) : rows.max() + margin + 1,
         max(0, columns.min() - margin) : columns.max() + margin + 1,
     ]
-    sides = BothSides(rgb[box], rough[box], band_px)
+    sides = OutlineColours(rgb[box], rough[box], band_px)
     told = (rough[box] > 0.5).astype(np.float32)
     for top in range(0, len(told), ROWS_AT_ONCE):
         rows, columns = np.nonzero(sides.near[top : top + ROWS_AT_ONCE])
@@ -60,7 +60,7 @@ def share_near_outline(rgb: np.ndarray, mask: np.ndarray, band_px: int) -> np.nd
             windows = patch_windows(sides, top, min(top + ROWS_AT_ONCE, len(told)))
             for first in range(0, len(rows), AT_ONCE):
                 some = np.s_[first : first + AT_ONCE]
-                told[top + rows[some], columns[some]] = _answers(patches(windows, rows[some], columns[some]))
+                told[top + rows[some], columns[some]] = _evaluate_network(patches(windows, rows[some], columns[some]))
     share[box] = told
     return share
 
@@ -89,7 +89,7 @@ class _Spread:
         return self._colours[self._which[top:end]]
 
 
-class BothSides:
+class OutlineColours:
     """Colours on both sides of a rough outline, and the patch values derived from them, computed some rows at a time.
 
     ``near (H, W)`` marks the pixels through which the outline may run. The object's colour is that of the nearest pixels well
@@ -99,7 +99,7 @@ class BothSides:
     def __init__(self, rgb: np.ndarray, rough: np.ndarray, band_px: int):
         """Take a picture (H, W, 3) uint8, its mask (H, W) float32 at that size, and the maximum error of the outline."""
         self.rough, self._rgb, self._band_px = rough, rgb, band_px
-        self.near, inner, outer = _where(rough > 0.5, band_px)
+        self.near, inner, outer = _outline_zones(rough > 0.5, band_px)
         self._told_apart = bool(inner.any() and outer.any())
         if not self._told_apart:
             return
@@ -170,7 +170,7 @@ class PatchWindows:
     contrast: np.ndarray
 
 
-def patch_windows(sides: BothSides, top: int, end: int) -> PatchWindows:
+def patch_windows(sides: OutlineColours, top: int, end: int) -> PatchWindows:
     """Return the windows around each pixel of the rows from ``top`` to ``end`` of a picture."""
     reach = AROUND_PX // 2 * STEP_PX + STEP_PX // 2
     first = max(0, top - reach)
@@ -219,7 +219,7 @@ def outline_model() -> str:
     return f"outline-network sha256:{hashlib.sha256(_weights_file()).hexdigest()[:12]}"
 
 
-def _answers(given: np.ndarray) -> np.ndarray:
+def _evaluate_network(given: np.ndarray) -> np.ndarray:
     """Evaluate the network: return the object probability (N,) in [0, 1] of the centre pixels of ``patches`` (N, F)."""
     layers = _layers()
     for weight, bias in layers[:-1]:
@@ -247,7 +247,7 @@ def _share_of(used: np.ndarray, side_px: int) -> np.ndarray:
     return np.asarray(cv2.blur(used.astype(np.float32), (side_px, side_px)))
 
 
-def _where(solid: np.ndarray, band_px: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _outline_zones(solid: np.ndarray, band_px: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the masks (H, W) of pixels near the outline, well inside the object, and just outside it."""
     depth = cv2.distanceTransform(solid.astype(np.uint8), cv2.DIST_L2, 5)
     away = cv2.distanceTransform((~solid).astype(np.uint8), cv2.DIST_L2, 5)

@@ -32,7 +32,7 @@ MOST_SAMPLES = 4000
 
 
 @dataclass(frozen=True)
-class Bracket:
+class MaskBounds:
     """Lower and upper bound of the object mask, each (H, W).
 
     ``certain`` has colours of neither the background nor its shade; ``possible`` has all colours but the background's own.
@@ -42,14 +42,14 @@ class Bracket:
     possible: np.ndarray
 
 
-def colour_opinion(rgb: np.ndarray) -> Bracket:
+def colour_opinion(rgb: np.ndarray) -> MaskBounds:
     """Segment ``rgb`` (H, W, 3) uint8 by colour alone at ``SIDE_PX``, and again at a finer scale around a small object.
 
     The first pass finds the object, the second refines its outline. With shades of the border's colours as background,
     shadows are removed, and so are grey parts of the object; without the shades both stay. The object lies between the two
     results.
     """
-    far = _seen(rgb, SIDE_PX, None)
+    far = _segment_by_colour(rgb, SIDE_PX, None)
     box = _around(far.possible)
     if box is None:
         return far
@@ -58,13 +58,13 @@ def colour_opinion(rgb: np.ndarray) -> Bracket:
     side_px = min(max(rgb.shape[:2]), round(SIDE_PX * max(rgb.shape[:2]) / longest))
     if side_px < CLOSER * min(SIDE_PX, max(rgb.shape[:2])):
         return far
-    near = _seen(rgb, side_px, box)
-    return Bracket(
-        *(_redrawn(*looks, blurred_px) for looks in ((far.certain, near.certain), (far.possible, near.possible)))
+    near = _segment_by_colour(rgb, side_px, box)
+    return MaskBounds(
+        *(_refine_outline(*looks, blurred_px) for looks in ((far.certain, near.certain), (far.possible, near.possible)))
     )
 
 
-def _redrawn(far: np.ndarray, near: np.ndarray, band_px: int) -> np.ndarray:
+def _refine_outline(far: np.ndarray, near: np.ndarray, band_px: int) -> np.ndarray:
     """Return the mask (H, W) of the first pass, replaced by that of the finer pass within a band along its outline."""
     along = dilated(far, band_px) & ~eroded(far, band_px)
     return np.asarray(np.where(along, near, far))
@@ -82,7 +82,7 @@ def _around(mask: np.ndarray) -> tuple[slice, slice] | None:
     )
 
 
-def _seen(rgb: np.ndarray, side_px: int, box: tuple[slice, slice] | None) -> Bracket:
+def _segment_by_colour(rgb: np.ndarray, side_px: int, box: tuple[slice, slice] | None) -> MaskBounds:
     """Segment ``rgb`` by colour at a given scale, only within ``box`` if it is given."""
     scale = min(1.0, side_px / max(rgb.shape[:2]))
     small = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
@@ -106,7 +106,7 @@ def _seen(rgb: np.ndarray, side_px: int, box: tuple[slice, slice] | None) -> Bra
         whole = np.zeros((height, width), np.float32)
         whole[part] = _cut(np.ascontiguousarray(lab[part]), ring, known, far)
         masks.append(cv2.resize(whole, rgb.shape[1::-1], interpolation=cv2.INTER_LINEAR) > 0.5)
-    return Bracket(*masks)
+    return MaskBounds(*masks)
 
 
 def _flattened(lab: np.ndarray, ring: np.ndarray) -> np.ndarray:

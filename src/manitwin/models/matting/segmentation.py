@@ -16,12 +16,12 @@ from manitwin.models.matting.outline import (
     edge_threshold,
     edges,
     eroded,
-    flood,
+    fill_small_holes,
+    flood_region,
     gradient_magnitude,
     opened,
-    without_small_holes,
 )
-from manitwin.models.matting.second_opinion import Bracket, colour_opinion
+from manitwin.models.matting.second_opinion import MaskBounds, colour_opinion
 from manitwin.models.matting.shade_strips import shade_strips
 from manitwin.models.matting.shadow import cast_shadow, gaps
 
@@ -48,7 +48,7 @@ class Segmentation:
     shadow: np.ndarray
     hard: np.ndarray
     agreement: float
-    colours: Bracket
+    colours: MaskBounds
     narrow: np.ndarray
 
     @property
@@ -66,10 +66,10 @@ def segment(rgb: np.ndarray) -> Segmentation:
     ball = max(3, round(BALL_SHARE * max(rgb.shape[:2])))
     frame = np.zeros(walls.shape, bool)
     frame[[0, -1]] = frame[:, [0, -1]] = True
-    candidate = ~flood(~walls, frame, ball_px=ball, regrow_px=ball + 2)
+    candidate = ~flood_region(~walls, frame, ball_px=ball, regrow_px=ball + 2)
     # strips of background colour without edges that are too narrow for the ball, e.g. between a table's edge and a shadow's
     plain = ~walls & (background.distance < 2.5)
-    candidate &= ~flood(~candidate | plain, ~candidate, ball_px=2, regrow_px=4)
+    candidate &= ~flood_region(~candidate | plain, ~candidate, ball_px=2, regrow_px=4)
     candidate &= ~background.seam | opened(candidate, 2 * ball)  # remainders of a seam are thin lines
     narrow = narrow_edges(gradient, edge_scale(background.lab), 1.6 * threshold, dilated(candidate, 2))
     shadow = cast_shadow(background, candidate, gradient, threshold, narrow)
@@ -82,19 +82,21 @@ def segment(rgb: np.ndarray) -> Segmentation:
     if strips.any():
         hard |= strips
         shadow |= strips
-        first = without_specks(first & ~strips)
+        first = remove_specks(first & ~strips)
     colours = colour_opinion(rgb)
-    joined, agreement = reconciled(first, colours, shadow | seen_through, narrow)
+    joined, agreement = combine_opinions(first, colours, shadow | seen_through, narrow)
     second = (
         first
         if agreement > SAME
-        else _graph_cut(background, joined, hard & ~joined, core_px=6, doubt=3.0, seed=0) & ~_away(joined)
+        else _graph_cut(background, joined, hard & ~joined, core_px=6, doubt=3.0, seed=0) & ~_distant_pixels(joined)
     )
-    mask = to_half_contrast(background, second)
+    mask = shrink_to_half_contrast(background, second)
     return Segmentation(mask, background, gradient, threshold, shadow & ~mask, hard & ~mask, agreement, colours, narrow)
 
 
-def reconciled(first: np.ndarray, colours: Bracket, shadow: np.ndarray, narrow: np.ndarray) -> tuple[np.ndarray, float]:
+def combine_opinions(
+    first: np.ndarray, colours: MaskBounds, shadow: np.ndarray, narrow: np.ndarray
+) -> tuple[np.ndarray, float]:
     """Combine two opinions into one mask; return it with their agreement in [0, 1].
 
     Pixels whose colour certainly differs from the background are added, and pixels whose colour cannot differ are removed;
@@ -134,7 +136,7 @@ def _open_to_outside(regions: np.ndarray, solid: np.ndarray, near_narrow: np.nda
     return kept
 
 
-def _away(mask: np.ndarray) -> np.ndarray:
+def _distant_pixels(mask: np.ndarray) -> np.ndarray:
     return ~dilated(mask, 3)
 
 
@@ -175,7 +177,7 @@ def _graph_cut(
     )
     mask = np.zeros(solid.shape, bool)
     mask[box] = (near == cv2.GC_FGD) | (near == cv2.GC_PR_FGD)
-    return without_specks(mask)
+    return remove_specks(mask)
 
 
 def _around(mask: np.ndarray, margin_px: int) -> tuple[np.ndarray, np.ndarray]:
@@ -188,7 +190,7 @@ def _around(mask: np.ndarray, margin_px: int) -> tuple[np.ndarray, np.ndarray]:
     return np.ix_(*near)
 
 
-def to_half_contrast(background: Background, mask: np.ndarray, band_px: int = 8) -> np.ndarray:
+def shrink_to_half_contrast(background: Background, mask: np.ndarray, band_px: int = 8) -> np.ndarray:
     """Move the outline inward to where a pixel is half object.
 
     The background colour B is known, and the object's colour F is that of the nearest pixel well inside. The share of the
@@ -212,10 +214,10 @@ def to_half_contrast(background: Background, mask: np.ndarray, band_px: int = 8)
     reached = ~mask
     for _ in range(band_px):
         reached |= dilated(reached, 1) & thin
-    return without_specks(mask & ~reached)
+    return remove_specks(mask & ~reached)
 
 
-def without_specks(mask: np.ndarray) -> np.ndarray:
+def remove_specks(mask: np.ndarray) -> np.ndarray:
     """Remove pieces below 0.05 % of the picture or 2 % of the largest piece, and fill small holes."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA].copy()
@@ -223,4 +225,4 @@ def without_specks(mask: np.ndarray) -> np.ndarray:
     if areas.max() == 0:
         return mask
     kept = (areas > max(5e-4 * mask.size, 0.02 * areas.max()))[labels]
-    return without_small_holes(kept)
+    return fill_small_holes(kept)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import ndimage
 
 from manitwin.models.matting.background import MAX_SHADE, MIN_SHADE, NEUTRAL, Background, length, total
-from manitwin.models.matting.outline import dilated, disk, eroded, flood, holds, opened
+from manitwin.models.matting.outline import dilated, disk, eroded, flood_region, holds, opened
 
 MAX_PENUMBRA = 3.5  # L*a*b* units per pixel at working size; cast shadows in sample photos have 1.5 to 3.3
 MOST_HELD = 0.04  # of a gap's area: a region that encloses more than this is a label with print
@@ -46,11 +46,11 @@ def cast_shadow(
     faint = contrast < 0.15 * (np.median(contrast[certain]) if certain.any() else 0.0)
     glow = faint & softest
     free = outside | ((shady | lit) & soft) | glow
-    reached, held = (flood(let, outside, ball_px=2, regrow_px=4) & candidate for let in (free, free & ~narrow))
-    return reached & ~_bounded(opened(reached & ~held, 2), outside | held, narrow)
+    reached, held = (flood_region(let, outside, ball_px=2, regrow_px=4) & candidate for let in (free, free & ~narrow))
+    return reached & ~_sharply_bounded(opened(reached & ~held, 2), outside | held, narrow)
 
 
-def _bounded(regions: np.ndarray, outside: np.ndarray, narrow: np.ndarray) -> np.ndarray:
+def _sharply_bounded(regions: np.ndarray, outside: np.ndarray, narrow: np.ndarray) -> np.ndarray:
     """Return those ``regions`` whose outline towards the ``outside`` lies mostly on ``narrow`` edges."""
     near_narrow = dilated(narrow, 3)
     count, labels = cv2.connectedComponents(regions.astype(np.uint8), connectivity=4)
@@ -141,7 +141,7 @@ def gaps(background: Background, candidate: np.ndarray, gradient: np.ndarray, th
         same = bias < own and np.median(rim_contrast) > CLEARLY * max(own, bias)
         shaded = residual[0] < own and np.hypot(*residual[1:]) < own + 1.5 and clear > CLEARLY * max(own, bias)
         distant = background.distance[box][rim]
-        if not _walled(background.lab, outside, labels == index, own):
+        if not _is_walled(background.lab, outside, labels == index, own):
             continue
         certain = (bias < 1.5 and np.median(distant) > 5) or (
             area > 0.01 * candidate.sum() and np.hypot(*residual[1:]) < 3 and np.percentile(distant, 20) > 12
@@ -156,7 +156,7 @@ def gaps(background: Background, candidate: np.ndarray, gradient: np.ndarray, th
     return found
 
 
-def _walled(lab: np.ndarray, outside: np.ndarray, region: np.ndarray, noise_lab: float) -> bool:
+def _is_walled(lab: np.ndarray, outside: np.ndarray, region: np.ndarray, noise_lab: float) -> bool:
     """Tell whether a region is surrounded by colours that are no mixture of its own colour and that of the background beside it.
 
     A true gap is separated from the outer background by the object. A grey body, or a body that the colour surfaces took for

@@ -13,19 +13,19 @@ from manitwin.models.matting.candidates import (
     AGREEING,
     Candidate,
     alike,
-    at_size,
     candidates,
     completed,
     network_makers,
     network_mask,
+    resize_share,
 )
-from manitwin.models.matting.digital_ground import without_haze
-from manitwin.models.matting.enlarged import enlarged
 from manitwin.models.matting.fine_outline import fine_outline
 from manitwin.models.matting.learned import Network, learned_alpha
-from manitwin.models.matting.object_network import in_two_looks, object_share
+from manitwin.models.matting.object_network import evaluate_coarse_to_fine, object_share
 from manitwin.models.matting.segmentation import Segmentation, segment
-from manitwin.models.matting.trimmed import exact_ground, with_margin
+from manitwin.models.matting.trimmed import restore_margin, uniform_background_colour
+from manitwin.models.matting.uniform_background import subtract_haze
+from manitwin.models.matting.upsampling import enlarge_photo
 
 PLAIN_NOISE_LAB = 4.0
 EXPLAINED_ODDS = 12.0
@@ -38,7 +38,7 @@ AGREED_ODDS = 3.0
 
 
 @dataclass(frozen=True)
-class Judged:
+class ScoredCandidate:
     """A candidate mask with its ``features``.
 
     ``is_explained``: its outline matches the template of the object that the photo is said to show. ``is_agreed``: two
@@ -51,7 +51,7 @@ class Judged:
     is_agreed: bool = False
 
     @property
-    def by_itself(self) -> float:
+    def photo_confidence(self) -> float:
         """Probability that the candidate is right, from the photo alone."""
         return probability(self.features)
 
@@ -59,10 +59,10 @@ class Judged:
     def confidence(self) -> float:
         """Probability that the candidate is right, with the odds of explanation and agreement."""
         odds = (EXPLAINED_ODDS if self.is_explained else 1.0) * (AGREED_ODDS if self.is_agreed else 1.0)
-        return odds * self.by_itself / (odds * self.by_itself + 1 - self.by_itself)
+        return odds * self.photo_confidence / (odds * self.photo_confidence + 1 - self.photo_confidence)
 
     @property
-    def of_pieces(self) -> float:
+    def pieces_confidence(self) -> float:
         """Probability that the mask contains no background, whether it has one piece or several."""
         return probability(np.where(WHOLE, 0.0, self.features))
 
@@ -74,11 +74,11 @@ class Study:
     ``found`` is the segmentation by the rules. ``judged`` has all candidates, the most probable first. ``alpha (H, W) uint8``
     is the first candidate at the size of the photo, empty if there is no candidate. ``shares`` (h, w) are the foreground
     probabilities of the ``network_makers``, completed inside their outlines. For a photo that was trimmed to the object,
-    masks and shares refer to the photo ``with_margin``.
+    masks and shares refer to the photo ``restore_margin``.
     """
 
     found: Segmentation
-    judged: list[Judged]
+    judged: list[ScoredCandidate]
     alpha: np.ndarray
     shares: list[np.ndarray]
 
@@ -102,7 +102,7 @@ class Study:
             "colours": chosen.known_to_colours,
         }
         for name, share in zip(network_makers(len(self.shares)), self.shares, strict=True):
-            said[name] = alike(chosen.mask, at_size(share, chosen.mask.shape) > 0.5)
+            said[name] = alike(chosen.mask, resize_share(share, chosen.mask.shape) > 0.5)
         return {name: round(value, 4) for name, value in said.items()}
 
 
@@ -137,40 +137,40 @@ def study_in_turn(
 
 def judged_candidates(
     rgb: np.ndarray, *, working_side_px: int = 512, networks: Sequence[Network] = ()
-) -> tuple[Segmentation, list[Judged], list[np.ndarray]]:
+) -> tuple[Segmentation, list[ScoredCandidate], list[np.ndarray]]:
     """Return the rules' segmentation, all candidates with their features, and each network's foreground probability.
 
     Arguments and errors are those of ``study_photo``. Each candidate is compared with every network; the best comparison
     counts for one or two networks and the second best for three, so that two of three must support it. A photo smaller than
-    ``working_side_px`` is ``enlarged``, a photo that was trimmed to the object is extended (``with_margin``).
+    ``working_side_px`` is ``enlarged``, a photo that was trimmed to the object is extended (``restore_margin``).
     """
-    exact = exact_ground(rgb)
-    rgb, _ = with_margin(rgb)
+    exact = uniform_background_colour(rgb)
+    rgb, _ = restore_margin(rgb)
     photo_side_px = max(rgb.shape[:2])
-    rgb = enlarged(rgb, working_side_px)
+    rgb = enlarge_photo(rgb, working_side_px)
     found = segment(_scaled(rgb, working_side_px))
     if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
         found = segment(_scaled(rgb, 2 * working_side_px))  # segment a small object again at twice the resolution
     asked = (*networks, None)
     shares = [network_share(rgb, max(found.mask.shape), each) for each in asked]
     if exact is not None:
-        shares = [without_haze(share, rgb, exact) for share in shares]
+        shares = [subtract_haze(share, rgb, exact) for share in shares]
     shares = [completed(share, found, exact=exact is not None) for share in shares]
-    agreed = _seen_alike(shares[:-1], found.mask.shape)
+    agreed = _agreed_mask(shares[:-1], found.mask.shape)
     made = candidates(found, shares, zoom=photo_side_px / max(found.mask.shape))
     judged = []
     for each in made:
         others = [other for other in made if other is not each and other.independent]
-        is_agreed = agreed is not None and each.scores.of_one_whole and alike(each.found.mask, agreed) > AGREEING
+        is_agreed = agreed is not None and each.scores.is_whole_object and alike(each.found.mask, agreed) > AGREEING
         beside = sorted(
-            (Judged(each, features(each, others, share), is_agreed=is_agreed) for share in shares),
+            (ScoredCandidate(each, features(each, others, share), is_agreed=is_agreed) for share in shares),
             key=lambda one: -one.confidence,
         )
         judged.append(beside[1 if len(beside) > 2 else 0])
     return found, judged, shares
 
 
-def _seen_alike(shares: Sequence[np.ndarray], shape: tuple[int, ...]) -> np.ndarray | None:
+def _agreed_mask(shares: Sequence[np.ndarray], shape: tuple[int, ...]) -> np.ndarray | None:
     """Return the mask (H, W) on which exactly two networks agree, given their foreground probabilities; otherwise None."""
     masks = [network_mask(share, shape) for share in shares]
     return masks[0] if len(masks) == 2 and alike(*masks) > AGREEING else None
@@ -183,16 +183,18 @@ def network_share(rgb: np.ndarray, side_px: int, network: Network | None) -> np.
     """
     if network is None:
         return object_share(_scaled(rgb, side_px))
-    return in_two_looks(_scaled(rgb, max(side_px, *network.side_px)), lambda seen: learned_alpha(network, seen))
+    return evaluate_coarse_to_fine(
+        _scaled(rgb, max(side_px, *network.side_px)), lambda seen: learned_alpha(network, seen)
+    )
 
 
 def drawn(rgb: np.ndarray, mask: np.ndarray, working_side_px: int = 512) -> np.ndarray:
     """Return the largest piece of a mask (any size) as alpha (H, W) uint8 at the size of ``rgb``, with a soft outline.
 
-    The mask refers to the photo ``with_margin``; the margin is cut off again.
+    The mask refers to the photo ``restore_margin``; the margin is cut off again.
     """
-    wider, margin_px = with_margin(rgb)
-    seen = enlarged(wider, working_side_px)
+    wider, margin_px = restore_margin(rgb)
+    seen = enlarge_photo(wider, working_side_px)
     alpha = fine_outline(seen, largest_piece(mask))
     if max(seen.shape[:2]) <= 2 * working_side_px:  # the first pass is fine enough for larger photos
         alpha = fine_outline(seen, alpha > 127)

@@ -66,7 +66,7 @@ def trimmed_margin(rgb: np.ndarray) -> tuple[int, np.ndarray] | None:
     return max(1, round(MARGIN * longer)), np.round(colour).astype(np.uint8)
 
 
-def exact_ground(rgb: np.ndarray) -> np.ndarray | None:
+def uniform_background_colour(rgb: np.ndarray) -> np.ndarray | None:
     """Return the one digital colour ``(3,) float32`` of the background of ``rgb (H, W, 3) uint8``; None if it has several.
 
     The frame of the picture decides.
@@ -90,7 +90,7 @@ def _ground_of_frame(rgb: np.ndarray, share: float) -> np.ndarray | None:
     return colour
 
 
-def with_margin(rgb: np.ndarray) -> tuple[np.ndarray, int]:
+def restore_margin(rgb: np.ndarray) -> tuple[np.ndarray, int]:
     """Return a photo ``rgb (H, W, 3) uint8`` with the trimmed margin restored on every side, and the margin in pixels.
 
     A photo that was not trimmed is returned unchanged, with margin 0.

@@ -16,10 +16,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-from manitwin.errors import BadReply, ConfigError, Unavailable, choose_from
+from manitwin.errors import BadReply, ConfigError, Unavailable, unknown_name_message
 from manitwin.formats.json_file import read_json_object
 from manitwin.models.generators import supervisor
-from manitwin.models.generators.command import passed
+from manitwin.models.generators.command import passed_environment
 from manitwin.models.pose_estimators.protocol import PoseGuesses, PoseRequest, parse_guesses
 from manitwin.models.services.keys import redacted
 
@@ -42,7 +42,7 @@ class CommandEstimator:
             raise ConfigError(f"command: {command!r} cannot be split into arguments: {error}") from error
         names = {name for word in self._words for name in _PLACEHOLDER.findall(word)}
         for name in sorted(names - set(PLACEHOLDERS)):
-            raise ConfigError(f"command: {choose_from('placeholder', name, PLACEHOLDERS)}")
+            raise ConfigError(f"command: {unknown_name_message('placeholder', name, PLACEHOLDERS)}")
         if names != set(PLACEHOLDERS):
             raise ConfigError("command: it needs {request} and {out}; give command:PROGRAM {request} {out}")
 
@@ -74,7 +74,7 @@ class CommandEstimator:
                 stdin=subprocess.PIPE,
                 stdout=output,
                 stderr=errors,
-                env=passed(os.environ, ()),
+                env=passed_environment(os.environ, ()),
                 start_new_session=True,  # Ctrl-C reaches only this process; the supervisor notices by the pipe
             )
         # leaving this block closes the pipe, upon which the supervisor ends the program

@@ -28,7 +28,7 @@ class UnknownName(OSError):
 
 
 @dataclass(frozen=True)
-class Reach:
+class AllowedServers:
     """The servers that may be connected to: the configured one at ``host`` and ``port``, at any address, and public ones.
 
     With ``on_this_machine`` the configured server's name must resolve to a loopback address.

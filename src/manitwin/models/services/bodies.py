@@ -23,7 +23,7 @@ class TooLarge(Exception):
     """A body exceeds the size limit."""
 
 
-def pieces(answer: httpx2.Response, max_bytes: int) -> Iterator[bytes]:
+def decompressed_chunks(answer: httpx2.Response, max_bytes: int) -> Iterator[bytes]:
     """Yield the decompressed body of an answer while it is received, in pieces of at most 1 MiB.
 
     The limit applies both to the received and to the decompressed bytes. Raises TooLarge, and httpx2.DecodingError for a body
@@ -78,7 +78,7 @@ def _unpacker(encoding: str) -> _Plain | _Zipped:
 
 def whole_body(answer: httpx2.Response, max_bytes: int) -> bytes:
     """Return a body of at most ``max_bytes``; raises TooLarge."""
-    return b"".join(pieces(answer, max_bytes))
+    return b"".join(decompressed_chunks(answer, max_bytes))
 
 
 class NotJson(Exception):

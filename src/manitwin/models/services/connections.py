@@ -14,7 +14,7 @@ import httpcore2
 import httpx2
 
 from manitwin.errors import ConfigError
-from manitwin.models.services.addresses import Reach, UnknownName, addresses_of
+from manitwin.models.services.addresses import AllowedServers, UnknownName, addresses_of
 
 MAX_CONNECT_S = 30.0
 LONGEST_STEP_S = 86_400.0  # sockets do not accept an infinite timeout
@@ -53,7 +53,7 @@ class GuardedTransport(httpx2.BaseTransport):
     no proxy reads it.
     """
 
-    def __init__(self, reach: Reach, deadline: Deadline):
+    def __init__(self, reach: AllowedServers, deadline: Deadline):
         self._reach, self._deadline = reach, deadline
         self._pools: list[httpcore2.ConnectionPool] = []
 
@@ -94,7 +94,7 @@ class GuardedTransport(httpx2.BaseTransport):
             return httpcore2.ConnectionPool(ssl_context=_tls(), network_backend=backend)
         if not own:
             self._check_for_proxy(host, port)
-        backend.reach = Reach(proxy.raw_host.decode(), _port_of(proxy))
+        backend.reach = AllowedServers(proxy.raw_host.decode(), _port_of(proxy))
         login = (proxy.username, proxy.password) if proxy.userinfo else None
         return httpcore2.HTTPProxy(
             httpcore2.URL(scheme=proxy.raw_scheme, host=proxy.raw_host, port=proxy.port, target=b"/"),
@@ -119,7 +119,7 @@ class GuardedTransport(httpx2.BaseTransport):
 class _GuardedBackend(httpcore2.NetworkBackend):
     """Network backend that resolves names, checks the addresses against ``reach``, and connects within the deadline."""
 
-    def __init__(self, reach: Reach, deadline: Deadline):
+    def __init__(self, reach: AllowedServers, deadline: Deadline):
         self.reach, self._deadline, self._inner = reach, deadline, httpcore2.SyncBackend()
 
     def connect_tcp(

@@ -10,10 +10,10 @@ import httpx2
 
 from manitwin.errors import BackendError, BadReply, Unavailable
 from manitwin.models.services.addresses import ForbiddenAddress
-from manitwin.models.services.bodies import TooLarge, pieces
+from manitwin.models.services.bodies import TooLarge, decompressed_chunks
 from manitwin.models.services.connections import Deadline
 from manitwin.models.services.keys import redacted
-from manitwin.models.services.refusal import Gone
+from manitwin.models.services.refusal import NotFound
 
 MAX_FILE_BYTES = 1 << 30
 MAX_REDIRECTS = 5
@@ -94,7 +94,7 @@ def _written(
     """Write the body of a response to ``part``; return the error or None, and whether a retry may help."""
     status = response.status_code
     if status in EXPIRED:
-        return Gone(f"{name}: the link to its file is no longer valid (HTTP {status})"), False
+        return NotFound(f"{name}: the link to its file is no longer valid (HTTP {status})"), False
     if status == 429 or status >= 500:
         return Unavailable(f"{name}: its file is not available now (HTTP {status}); run again later"), True
     if status != 200:
@@ -102,7 +102,7 @@ def _written(
     announced = response.headers.get("Content-Length", "")
     length = 0
     with part.open("wb") as stream:
-        for piece in pieces(response, max_bytes):
+        for piece in decompressed_chunks(response, max_bytes):
             length += len(piece)
             deadline.extend(len(piece) / LEAST_BYTES_PER_S)
             stream.write(piece)

@@ -15,21 +15,21 @@ import httpx2
 from manitwin.config import ServicesConfig
 from manitwin.engine.charges import REHEARSAL_MARK, note_rehearsal
 from manitwin.errors import BadReply, ConfigError, ManiTwinError, RateLimited, Unavailable
-from manitwin.models.services.addresses import ForbiddenAddress, Reach
+from manitwin.models.services.addresses import AllowedServers, ForbiddenAddress
 from manitwin.models.services.bodies import NotJson, TooLarge, parsed, whole_body
 from manitwin.models.services.connections import MAX_CONNECT_S, Deadline, GuardedTransport
 from manitwin.models.services.download import MAX_FILE_BYTES, download_file
 from manitwin.models.services.keys import check_key, is_local, redacted, without_key
 from manitwin.models.services.refusal import (
+    AnswerLost,
     FailedRequest,
-    Gone,
-    NotTaken,
+    NotFound,
     Refusal,
-    Unanswered,
+    RequestRejected,
     error_for,
     refusal_by_status,
     retry_after_s,
-    until_answered,
+    retry_request,
 )
 
 MAX_ANSWER_BYTES = 16 << 20
@@ -91,7 +91,7 @@ class HttpService:
             raise ConfigError(f"{name}: {base_url!r} is not the address of a web service; give http:// or https://")
         check_key(key, base_url, f"the key of {name}")
         _, host, port = self._own
-        self._reach = Reach(host, port, on_this_machine=is_local(base_url))
+        self._reach = AllowedServers(host, port, on_this_machine=is_local(base_url))
         self.name, self.base_url = name, base_url.rstrip("/")
         self._authorization, self._key = dict(authorization), key
         self._services, self._remedy, self._refusal, self._sleep = services, remedy, refusal, sleep
@@ -145,8 +145,10 @@ class HttpService:
             parts: list[tuple[str, Any]] = [(name, (None, value)) for name, value in fields.items()]
             content["files"] = parts + [(f.field, (f.filename, f.content, f.mime)) for f in files]
         url = self._address(path)
-        attempt = partial(self._once, method, url, content, pays, MAX_ANSWER_BYTES if max_bytes is None else max_bytes)
-        return until_answered(attempt, self._services, self._sleep)
+        attempt = partial(
+            self._send_once, method, url, content, pays, MAX_ANSWER_BYTES if max_bytes is None else max_bytes
+        )
+        return retry_request(attempt, self._services, self._sleep)
 
     def download(
         self,
@@ -164,8 +166,8 @@ class HttpService:
         """
         for again in (True, False):
             try:
-                until_answered(partial(self._file, url, to, max_bytes), self._services, self._sleep)
-            except Gone as error:
+                retry_request(partial(self._file, url, to, max_bytes), self._services, self._sleep)
+            except NotFound as error:
                 if not again or fresh_url is None:
                     raise BadReply(f"{error}; run it again") from None
                 url = fresh_url()
@@ -179,7 +181,7 @@ class HttpService:
     def unreadable(self, what: str, pays: bool = False) -> ManiTwinError:
         """Return the error for an answer without ``what``; for a request that ``pays``, the job may have been accepted."""
         if pays:
-            return Unanswered(
+            return AnswerLost(
                 f"{self.name}: its answer to a submit has no {what}; it is unknown whether the service accepted the job"
             )
         return BadReply(f"{self.name}: its answer has no {what}; run it again")
@@ -193,7 +195,7 @@ class HttpService:
             )
         return url
 
-    def _once(
+    def _send_once(
         self, method: str, url: str, content: dict[str, Any], pays: bool, max_bytes: int
     ) -> bytes | FailedRequest:
         """Send a request once; return the body or the failure with the decision whether it may be repeated."""
@@ -204,16 +206,16 @@ class HttpService:
                 status, after = response.status_code, retry_after_s(response.headers.get("Retry-After"))
                 data = whole_body(response, max_bytes)
         except _NOT_SENT as error:
-            return FailedRequest(self._silent(error, False), again=True)
+            return FailedRequest(self._no_answer_error(error, False), again=True)
         except httpx2.RequestError as error:  # timeouts, lost connections, invalid HTTP
-            return FailedRequest(self._silent(error, pays), again=not pays)
+            return FailedRequest(self._no_answer_error(error, pays), again=not pays)
         except TooLarge:
             return FailedRequest(self.unreadable(f"end within {max_bytes} bytes", pays), again=False)
         except ForbiddenAddress as error:
             return FailedRequest(Unavailable(f"{self.name}: {error}; nothing was sent"), again=False)
-        return self._judged(status, data, after, pays)
+        return self._interpret_response(status, data, after, pays)
 
-    def _judged(self, status: int, data: bytes, after: float | None, pays: bool) -> bytes | FailedRequest:
+    def _interpret_response(self, status: int, data: bytes, after: float | None, pays: bool) -> bytes | FailedRequest:
         """Return the body of an accepted request, or the failure of a refused one."""
         if 300 <= status < 400:
             error: ManiTwinError = BadReply(f"{self.name}: {self.base_url} redirects; give the new address after @")
@@ -226,11 +228,11 @@ class HttpService:
         if refusal is None:
             return data
         error = error_for(self.name, Refusal(self.said(refusal.message), refusal.kind), status, self._remedy, after)
-        if isinstance(error, NotTaken):
+        if isinstance(error, RequestRejected):
             error.words = without_key(refusal.message[:_WORDS], self._key)
         if pays and status in _ANSWER_LOST:
             return FailedRequest(
-                Unanswered(f"{error}; it is unknown whether the service accepted the job"), again=False
+                AnswerLost(f"{error}; it is unknown whether the service accepted the job"), again=False
             )
         retryable = refusal.kind == "busy" or (refusal.kind == "down" and (not pays or status in _NOT_TAKEN))
         return FailedRequest(error, again=retryable, wait_s=after if isinstance(error, RateLimited) else None)
@@ -259,10 +261,10 @@ class HttpService:
             event_hooks={"response": [_note_rehearsal]},
         )
 
-    def _silent(self, error: httpx2.RequestError, pays: bool) -> ManiTwinError:
+    def _no_answer_error(self, error: httpx2.RequestError, pays: bool) -> ManiTwinError:
         cause = self.said(str(error)) or type(error).__name__
         if pays:
-            return Unanswered(
+            return AnswerLost(
                 f"{self.name}: no answer to a submit ({cause}); it is unknown whether the service accepted the job"
             )
         return error_for(self.name, Refusal(f"{self.base_url} does not answer ({cause})", "down"), None, "", None)

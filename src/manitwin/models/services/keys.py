@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from urllib.parse import urlsplit
 
-from manitwin.errors import ConfigError, choose_from
+from manitwin.errors import ConfigError, unknown_name_message
 from manitwin.formats.printable import printable_line
 
 ADDRESS = re.compile(r"(?:^|@)([A-Za-z][A-Za-z0-9+.-]*://.*)$")
@@ -49,7 +49,7 @@ def _checked(url: str) -> str:
     except ValueError as error:
         raise ConfigError(f"{url!r} is not the URL of a server ({error}); give {_EXAMPLE}") from error
     if parts.scheme not in SCHEMES:
-        raise ConfigError(f"{url!r}: {choose_from('scheme', parts.scheme, SCHEMES)}")
+        raise ConfigError(f"{url!r}: {unknown_name_message('scheme', parts.scheme, SCHEMES)}")
     if not HOST.fullmatch(host) or port == 0 or any(letter.isspace() for letter in url):
         raise ConfigError(f"{url!r} is not the URL of a server; give {_EXAMPLE}")
     if parts.query or parts.fragment:

@@ -21,11 +21,11 @@ AnswerT = TypeVar("AnswerT")
 Kind = Literal["denied", "busy", "down", "gone", "input", "bad"]
 
 
-class Gone(BadReply):
+class NotFound(BadReply):
     """The service does not know, or no longer has, the requested job or file."""
 
 
-class NotTaken(BadReply):
+class RequestRejected(BadReply):
     """The service does not accept the request (400, 422); ``words`` is its message without the key."""
 
     def __init__(self, message: str, words: str = ""):
@@ -36,7 +36,7 @@ class NotTaken(BadReply):
         return type(self), (str(self), self.words)
 
 
-class Unanswered(Unavailable):
+class AnswerLost(Unavailable):
     """A request may have been accepted and paid for, but its answer was lost."""
 
 
@@ -64,7 +64,7 @@ class FailedRequest:
     wait_s: float | None = None
 
 
-def until_answered(
+def retry_request(
     attempt: Callable[[], AnswerT | FailedRequest], services: ServicesConfig, sleep: Callable[[float], None]
 ) -> AnswerT:
     """Return the answer of the first successful attempt; raises the error of the last failure.
@@ -90,7 +90,7 @@ def refusal_by_status(status: int, body: Any) -> Refusal | None:
     """Parse a refusal by its HTTP status (RFC 9110, section 15), with the message from the usual fields; None below 400."""
     if status < 400:
         return None
-    return Refusal(words_of(body) or f"HTTP {status}", kind_of_status(status))
+    return Refusal(error_message(body) or f"HTTP {status}", kind_of_status(status))
 
 
 def kind_of_status(status: int) -> Kind:
@@ -104,7 +104,7 @@ def kind_of_status(status: int) -> Kind:
     return "down" if status >= 500 else "bad"
 
 
-def words_of(body: Any, deepest: int = _DEEPEST_WORDS) -> str:
+def error_message(body: Any, deepest: int = _DEEPEST_WORDS) -> str:
     """Return the message of an error body: the texts of ``error``, ``message``, ``msg``, ``detail``, ``text``, ``suggestion``.
 
     Nested values are searched to a limited depth.
@@ -114,11 +114,11 @@ def words_of(body: Any, deepest: int = _DEEPEST_WORDS) -> str:
     if deepest == 0:
         return ""
     if isinstance(body, list):
-        return "; ".join(filter(None, (words_of(part, deepest - 1) for part in body[:3])))
+        return "; ".join(filter(None, (error_message(part, deepest - 1) for part in body[:3])))
     if not isinstance(body, dict):
         return ""
     names = ("error", "message", "msg", "detail", "text", "suggestion")
-    found = [words_of(body.get(name), deepest - 1) for name in names]
+    found = [error_message(body.get(name), deepest - 1) for name in names]
     return ": ".join(dict.fromkeys(filter(None, found)))
 
 
@@ -135,8 +135,8 @@ def error_for(name: str, refusal: Refusal, status: int | None, remedy: str, afte
     if refusal.kind == "input":
         return Rejected("generator_failed", what, "generate")
     if status in (400, 422):
-        return NotTaken(what, refusal.message)
-    return (Gone if refusal.kind == "gone" else BadReply)(what)
+        return RequestRejected(what, refusal.message)
+    return (NotFound if refusal.kind == "gone" else BadReply)(what)
 
 
 def retry_after_s(value: str | None) -> float | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from manitwin.config import BuildConfig
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.models.generators.protocol import Generator
 from manitwin.models.text_to_image.command import CommandPictures
 from manitwin.models.text_to_image.fal import FalPictures
@@ -27,4 +27,4 @@ def choose_text_to_image(spec: str, config: BuildConfig, answers: Path) -> Gener
         return FalPictures.from_spec(argument, config)
     if kind == "openai":
         return OpenAiPictures.from_spec(argument, config, answers)
-    raise UsageError(choose_from("text-to-image model", kind, KINDS))
+    raise UsageError(unknown_name_message("text-to-image model", kind, KINDS))

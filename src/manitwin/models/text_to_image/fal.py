@@ -21,7 +21,7 @@ class FalPictures(FalGenerator):
     written_name, made = "picture.png", "picture"
 
     @staticmethod
-    def taken_by(endpoint: str) -> Endpoint:
+    def endpoint_input(endpoint: str) -> Endpoint:
         """Return the input description of any endpoint: a text and a seed."""
         return Endpoint(None, prompt=True, seeds=2**31)
 

@@ -21,7 +21,7 @@ from manitwin.models.generators.protocol import Asked, Generated, GenerationRequ
 from manitwin.models.generators.vendor import usd_per_job
 from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import bearer, key_from_environment, split_url
-from manitwin.models.services.refusal import Gone
+from manitwin.models.services.refusal import NotFound
 from manitwin.twin.store import write_bytes_atomically
 
 VENDOR = "https://api.openai.com/v1"
@@ -92,7 +92,7 @@ class OpenAiPictures:
     def poll(self, job_id: str) -> JobState:
         """Return done if the picture's file exists; raises Gone otherwise."""
         if not (self._answers / job_id).is_file():
-            raise Gone("openai: the answer that was kept is gone; it is asked again")
+            raise NotFound("openai: the answer that was kept is gone; it is asked again")
         return JobState("done")
 
     def fetch(self, job_id: str, folder: Path) -> Generated:

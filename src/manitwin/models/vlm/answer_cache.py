@@ -9,11 +9,11 @@ import tempfile
 from hashlib import sha256
 from pathlib import Path
 
-from manitwin.engine.charges import counted, note_rehearsal
+from manitwin.engine.charges import note_rehearsal, record_charges
 from manitwin.errors import BadReply
 from manitwin.formats.json_file import read_json_object
 from manitwin.formats.user_folders import cache_home
-from manitwin.models.vlm.client import Around, ChatClient
+from manitwin.models.vlm.client import ChatClient, ChatWrapper
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage, question_digest
 
 RUN = logging.getLogger("manitwin.run")
@@ -25,7 +25,7 @@ def default_folder() -> Path:
     return cache_home() / "vlm"
 
 
-class Cached(Around):
+class CachedChat(ChatWrapper):
     """A chat client with a disk cache of answers.
 
     The cache key covers the question, its turns and what else ``decides`` the answer: server, model and settings. Several
@@ -45,7 +45,7 @@ class Cached(Around):
         path = self._path(question, turns)
         kept = _read(path)
         if kept is None:
-            with counted() as bill:
+            with record_charges() as bill:
                 reply = self.inner.ask(question, turns)
             try:
                 _write(path, reply, bill.rehearsed)

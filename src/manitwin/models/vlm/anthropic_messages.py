@@ -17,7 +17,7 @@ from manitwin.config import ServicesConfig, VlmConfig
 from manitwin.errors import ConfigError
 from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import bearer
-from manitwin.models.services.refusal import NotTaken, Refusal, refusal_by_status
+from manitwin.models.services.refusal import Refusal, RequestRejected, refusal_by_status
 from manitwin.models.vlm.client import Completion, ServedChat, counted_tokens
 from manitwin.models.vlm.openai_dialect import instructions_with_schema, titled_schema
 from manitwin.models.vlm.prices import estimated_usage
@@ -80,7 +80,7 @@ class AnthropicMessages(ServedChat):
         while True:
             try:
                 answer = self._service.post_json(self.endpoint, self._body(question, turns))
-            except NotTaken as error:
+            except RequestRejected as error:
                 if not self._does_without(error.words):
                     raise
             else:

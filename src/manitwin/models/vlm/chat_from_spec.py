@@ -8,11 +8,11 @@ from urllib.parse import urlsplit
 from manitwin.config import BuildConfig
 from manitwin.errors import ConfigError
 from manitwin.models.services.keys import key_from_environment, split_url
-from manitwin.models.vlm.answer_cache import Cached, default_folder
+from manitwin.models.vlm.answer_cache import CachedChat, default_folder
 from manitwin.models.vlm.anthropic_messages import ANTHROPIC_URL, AnthropicMessages
 from manitwin.models.vlm.client import ChatClient
 from manitwin.models.vlm.openai_chat import OPENAI_URL, OpenAiChat
-from manitwin.models.vlm.replay import Recorded, Replay
+from manitwin.models.vlm.replay import RecordedChat, Replay
 
 # a vendor's key is sent to the vendor's host only; other servers have a separate variable
 KEY_OF_HOST = {
@@ -75,5 +75,5 @@ def _served(
     key = key_from_environment((key_name,), url, f"{kind.name}:{argument}", own_server=own_server)
     chat: ChatClient = kind(model, url, key, config.vlm, config.services, key_name=key_name)
     if config.services.cache:
-        chat = Cached(chat, default_folder())
-    return chat if config.services.record is None else Recorded(chat, config.services.record)
+        chat = CachedChat(chat, default_folder())
+    return chat if config.services.record is None else RecordedChat(chat, config.services.record)

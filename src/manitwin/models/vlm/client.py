@@ -60,7 +60,7 @@ class ServedChat:
         return {"protocol": self.name, "server": self.base_url, "model": self.model, **settings}
 
 
-class Around:
+class ChatWrapper:
     """Base class of a chat client that wraps another one."""
 
     def __init__(self, inner: ChatClient):
@@ -79,7 +79,7 @@ class Around:
 
 
 @runtime_checkable
-class Forgetful(Protocol):
+class ForgettingChat(Protocol):
     """A chat model that stores answers and can delete one that proved useless."""
 
     def forget(self, question: Question, turns: tuple[Turn, ...] = ()) -> None:

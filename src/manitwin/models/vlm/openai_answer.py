@@ -21,13 +21,13 @@ def text_of(content: Any) -> str | None:
     return "".join(said) if said and all(isinstance(each, str) for each in said) else None
 
 
-def only_thought(message: Mapping[str, Any], text: str) -> bool:
+def is_reasoning_only(message: Mapping[str, Any], text: str) -> bool:
     """Tell whether a model returned only its reasoning: vLLM and others return reasoning beside an empty answer."""
     thoughts = [message.get(name) for name in ("reasoning_content", "reasoning")]
     return not text.strip() and any(isinstance(each, str) and each.strip() for each in thoughts)
 
 
-def remedy_of(words: str) -> str | None:
+def refusal_remedy(words: str) -> str | None:
     """Return the remedy for a refused request by the server's message; None for an unknown message."""
     if _CONTEXT.search(words):
         return "serve it with a longer context, or ask with smaller pictures (vlm.picture_px)"

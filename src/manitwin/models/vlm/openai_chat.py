@@ -11,9 +11,9 @@ from manitwin.config import ServicesConfig, VlmConfig
 from manitwin.errors import ConfigError
 from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import bearer
-from manitwin.models.services.refusal import Gone, NotTaken, Refusal, refusal_by_status
+from manitwin.models.services.refusal import NotFound, Refusal, RequestRejected, refusal_by_status
 from manitwin.models.vlm.client import Completion, ServedChat, counted_tokens
-from manitwin.models.vlm.openai_answer import NOT_THERE, only_thought, remedy_of, text_of
+from manitwin.models.vlm.openai_answer import NOT_THERE, is_reasoning_only, refusal_remedy, text_of
 from manitwin.models.vlm.openai_dialect import Dialect, request_body
 from manitwin.models.vlm.prices import estimated_usage
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
@@ -71,14 +71,14 @@ class OpenAiChat(ServedChat):
         while True:
             try:
                 answer = self._service.post_json(self.endpoint, self._body(question, turns))
-            except NotTaken as error:
+            except RequestRejected as error:
                 narrower = self.dialect.without(error.words)
                 if narrower is None:
-                    remedy = remedy_of(error.words)
-                    raise error if remedy is None else NotTaken(f"{error}; {remedy}", error.words) from None
+                    remedy = refusal_remedy(error.words)
+                    raise error if remedy is None else RequestRejected(f"{error}; {remedy}", error.words) from None
                 self.dialect = narrower
-            except Gone as error:
-                raise Gone(f"{error}; {NOT_THERE}") from None
+            except NotFound as error:
+                raise NotFound(f"{error}; {NOT_THERE}") from None
             else:
                 return self._completion(answer, question).paid(self.price, self._who)
 
@@ -109,7 +109,7 @@ class OpenAiChat(ServedChat):
         usage = _usage(answer.get("usage")) or estimated_usage(question, text)
         model = self._service.said(str(answer.get("model") or ""))
         fault = self._fault(choice.get("finish_reason"), refused)
-        if fault is None and only_thought(message, text):
+        if fault is None and is_reasoning_only(message, text):
             fault = "it thought and gave no answer; serve it without thinking, or raise vlm.max_tokens"
         return Completion(text, usage, model, fault)
 

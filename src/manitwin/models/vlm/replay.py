@@ -16,12 +16,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from manitwin.engine.charges import counted, note_rehearsal
+from manitwin.engine.charges import note_rehearsal, record_charges
 from manitwin.errors import BadReply, ConfigError
 from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.json_file import parse_json
 from manitwin.formats.printable import printable_line
-from manitwin.models.vlm.client import Around, ChatClient, Forgetful
+from manitwin.models.vlm.client import ChatClient, ChatWrapper, ForgettingChat
 from manitwin.models.vlm.prices import FREE, TokenPrice
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage, question_digest
 
@@ -79,7 +79,7 @@ class Replay:
         return reply
 
 
-class Recorded(Around):
+class RecordedChat(ChatWrapper):
     """A chat client whose answers are appended to a record, which any number of processes may share.
 
     An answer that is already recorded is not appended again. Raises ConfigError for a record of another model.
@@ -97,14 +97,14 @@ class Recorded(Around):
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
         """Answer a question, and record the answer."""
-        with counted() as bill:
+        with record_charges() as bill:
             reply = self.inner.ask(question, turns)
         self._record(question, question_digest(question, turns), reply, bill.rehearsed)
         return reply
 
     def forget(self, question: Question, turns: tuple[Turn, ...] = ()) -> None:
         """Delete the answer from the wrapped client's storage; the record is unchanged."""
-        if isinstance(self.inner, Forgetful):
+        if isinstance(self.inner, ForgettingChat):
             self.inner.forget(question, turns)
 
     def _record(self, question: Question, key: str, reply: Reply, rehearsed: bool) -> None:

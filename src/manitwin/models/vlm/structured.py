@@ -16,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 from manitwin.errors import BadReply
 from manitwin.formats.image_file import png_of
 from manitwin.models.services.bodies import MOST_LEVELS, levels
-from manitwin.models.vlm.client import Forgetful
+from manitwin.models.vlm.client import ForgettingChat
 from manitwin.models.vlm.protocol import ChatModel, Picture, Question, Turn
 from manitwin.models.vlm.strict_schema import strict_schema
 
@@ -38,21 +38,21 @@ LONGEST_COMPLAINT = 240
 
 
 @dataclass(frozen=True)
-class Answered(Generic[T]):
+class ValidatedAnswer(Generic[T]):
     """A valid answer, and the remaining findings about its content."""
 
     value: T
     findings: tuple[str, ...]
 
 
-def nothing_found(value: BaseModel) -> Sequence[str]:
+def no_findings(value: BaseModel) -> Sequence[str]:
     """Report no findings about an answer."""
     return ()
 
 
 def ask(
-    chat: ChatModel, question: Question, answer: type[T], examine: Callable[[T], Sequence[str]] = nothing_found
-) -> Answered[T]:
+    chat: ChatModel, question: Question, answer: type[T], examine: Callable[[T], Sequence[str]] = no_findings
+) -> ValidatedAnswer[T]:
     """Ask a question and return its answer as an instance of ``answer``.
 
     If the answer cannot be parsed or validated, the model is asked once more with the error; if that fails too, BadReply is
@@ -80,7 +80,7 @@ def ask(
         else:
             findings = tuple(examine(value))
             if examined or not findings:
-                return Answered(value, findings)
+                return ValidatedAnswer(value, findings)
             examined = True
             said = _listed(
                 "Please check your answer again. It contradicts what is known:",
@@ -113,7 +113,7 @@ def _listed(opening: str, lines: Sequence[str], closing: str) -> str:
 
 def _forget(chat: ChatModel, question: Question, turns: tuple[Turn, ...]) -> None:
     # cached answers of a failed conversation would make it fail again
-    if isinstance(chat, Forgetful):
+    if isinstance(chat, ForgettingChat):
         for length in range(0, len(turns) + 1, 2):
             chat.forget(question, turns[:length])
 

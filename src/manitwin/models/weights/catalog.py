@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 
 
 @dataclass(frozen=True)
@@ -91,5 +91,5 @@ KNOWN_WEIGHTS = {weights.name: weights for weights in _KNOWN}
 def known_weights(name: str) -> KnownWeights:
     """Return weights by name; raises UsageError, which lists the names."""
     if name not in KNOWN_WEIGHTS:
-        raise UsageError(choose_from("weights", name, KNOWN_WEIGHTS))
+        raise UsageError(unknown_name_message("weights", name, KNOWN_WEIGHTS))
     return KNOWN_WEIGHTS[name]

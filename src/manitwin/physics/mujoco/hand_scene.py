@@ -66,7 +66,7 @@ class HandScene:
 
         Without interpolation the fingers would move twice as fast within a frame and knock light objects away.
         """
-        self.target.move_on(float(self.data.qpos[self.joints].mean()))
+        self.target.advance_target(float(self.data.qpos[self.joints].mean()))
 
     def presses(self) -> bool:
         """Tell whether the target is far enough ahead of the fingers that they press with the closing force."""

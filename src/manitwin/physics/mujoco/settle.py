@@ -24,7 +24,7 @@ from manitwin.physics.mujoco.body import (
     contact_parameters,
     new_spec,
 )
-from manitwin.physics.sapien.settle import Settled
+from manitwin.physics.sapien.settle import SettledBody
 
 PLANE_HALF_SIZE_M = 10.0
 _BALL_FRICTION = 0.5
@@ -38,7 +38,7 @@ def settle_on_plane_in_mujoco(
     drop_m: float,
     seconds: float,
     timestep_s: float = TIMESTEP_S,
-) -> list[Settled]:
+) -> list[SettledBody]:
     """Release a body ``drop_m`` above the plane z = 0 in each of several poses ``(4, 4)`` and simulate for ``seconds`` each."""
     if not len(object_to_plane):
         return []
@@ -54,7 +54,7 @@ def _model(body: RigidBody, timestep_s: float) -> mujoco.MjModel:
     return spec.compile()
 
 
-def _settle(model: mujoco.MjModel, body: RigidBody, pose: np.ndarray, drop_m: float, seconds: float) -> Settled:
+def _settle(model: mujoco.MjModel, body: RigidBody, pose: np.ndarray, drop_m: float, seconds: float) -> SettledBody:
     data = mujoco.MjData(model)
     address = model.joint(OBJECT).qposadr[0]
     data.qpos[address : address + 3] = pose[:3, 3] + [0, 0, drop_m]
@@ -64,7 +64,7 @@ def _settle(model: mujoco.MjModel, body: RigidBody, pose: np.ndarray, drop_m: fl
     end = transform(data.xmat[number].reshape(3, 3), data.xpos[number])
     speed = data.qvel[model.joint(OBJECT).dofadr[0] :][:6]
     still = np.linalg.norm(speed[:3]) < STILL_M_S and np.linalg.norm(speed[3:]) < STILL_RAD_S
-    return Settled.of(body, pose, end, bool(still))
+    return SettledBody.of(body, pose, end, bool(still))
 
 
 def ball_stays_inside_in_mujoco(hulls: Sequence[np.ndarray], opening: Opening) -> bool:

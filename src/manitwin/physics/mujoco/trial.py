@@ -31,7 +31,7 @@ from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import TrialWatch, run_brief_phases, run_phases
 from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
-from manitwin.robots.grippers.gripper import Gripper, of_kind
+from manitwin.robots.grippers.gripper import Gripper, require_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class MujocoTrial:
         """Try the grasps ``gripper_to_object (N, 4, 4)``; MuJoCo's own time step replaces that of ``settings`` (``frozen``)."""
         if not len(gripper_to_object):
             return []
-        settings, hand = frozen(settings), of_kind(gripper, ParallelGripper)
+        settings, hand = with_mujoco_timestep(settings), require_kind(gripper, ParallelGripper)
         model = _MODELS.of(body, hand, settings)
         return [_try_one(model, hand, inverse(pose), settings) for pose in gripper_to_object]
 
@@ -69,7 +69,11 @@ class MujocoTrial:
         joints_rad: np.ndarray | None = None,
     ) -> TrialRecording:
         """Try one grasp ``gripper_to_object (4, 4)`` as ``run`` does, and return its states."""
-        settings, hand, recorder = frozen(settings), of_kind(gripper, ParallelGripper), TrialRecorder()
+        settings, hand, recorder = (
+            with_mujoco_timestep(settings),
+            require_kind(gripper, ParallelGripper),
+            TrialRecorder(),
+        )
         object_to_hand = inverse(gripper_to_object)
         result = _try_one(_MODELS.of(body, hand, settings), hand, object_to_hand, settings, recorder)
         return recorder.recording(result, object_to_hand, np.full(2, hand.opening_m / 2))
@@ -122,7 +126,7 @@ def _try_one(
     return result
 
 
-def frozen(settings: TrialSettings) -> TrialSettings:
+def with_mujoco_timestep(settings: TrialSettings) -> TrialSettings:
     """Return the settings with MuJoCo's time step and the same total time."""
     most_s = settings.max_steps * settings.timestep_s
     return replace(

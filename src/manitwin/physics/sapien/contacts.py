@@ -27,7 +27,7 @@ ROBOT_NAME = "robot"
 
 
 @dataclass(frozen=True)
-class MeantContacts:
+class AllowedContacts:
     """Contacts that are allowed during a phase, by names of bodies: of the fingers, and of the target in the hand.
 
     ``target`` None: contacts of the target are not checked, as in pick-and-place. ``palm``: the target may touch the palm
@@ -39,11 +39,11 @@ class MeantContacts:
     palm: bool = False
 
 
-NONE_MEANT = MeantContacts()
+NONE_MEANT = AllowedContacts()
 
 
 @dataclass(frozen=True)
-class Push:
+class ResultantForce:
     """Resultant contact force ``(3,)`` N on a body, along the contact normals, and its mean point ``(3,)`` m; world frame."""
 
     force_n: np.ndarray
@@ -51,7 +51,7 @@ class Push:
 
 
 @dataclass(frozen=True)
-class Touches:
+class TargetContacts:
     """Force (N) of each finger on the target, the first arm's before the second's; ``on_support``: something else supports it."""
 
     finger_forces_n: tuple[float, ...]
@@ -97,7 +97,9 @@ class ContactReader:
             ]  # SAPIEN creates the list of bodies anew on each access
         return contacts
 
-    def push(self, contacts: Iterable[physx.PhysxContact], on: str, by: frozenset[str]) -> Push | None:
+    def resultant_force(
+        self, contacts: Iterable[physx.PhysxContact], on: str, by: frozenset[str]
+    ) -> ResultantForce | None:
         """Return the resultant force of the bodies ``by`` on the body ``on``, all by name; None without contact."""
         impulse, places, weights = np.zeros(3), list[np.ndarray](), list[float]()
         for contact in contacts:
@@ -112,9 +114,9 @@ class ContactReader:
                     weights.append(float(np.linalg.norm(point.impulse)))
         if not places:
             return None
-        return Push(impulse / self._system.timestep, np.average(places, axis=0, weights=weights))
+        return ResultantForce(impulse / self._system.timestep, np.average(places, axis=0, weights=weights))
 
-    def touches(self, contacts: Iterable[physx.PhysxContact]) -> Touches:
+    def touches(self, contacts: Iterable[physx.PhysxContact]) -> TargetContacts:
         """Return the finger forces on the target and whether it is supported."""
         impulses = [np.zeros(3), np.zeros(3)]
         on_support = False
@@ -130,9 +132,9 @@ class ContactReader:
             elif second <= Role.MINUS_FINGER:
                 impulses[second] -= _impulse(contact)
         plus_n, minus_n = (float(np.linalg.norm(impulse)) / self._system.timestep for impulse in impulses)
-        return Touches((plus_n, minus_n), on_support)
+        return TargetContacts((plus_n, minus_n), on_support)
 
-    def pressing(self, contacts: Iterable[physx.PhysxContact]) -> set[frozenset[str]]:
+    def pressing_pairs(self, contacts: Iterable[physx.PhysxContact]) -> set[frozenset[str]]:
         """Return the pairs of names of bodies that press on each other.
 
         All parts of a robot are named ``ROBOT_NAME``; for two arms each part has its arm's name.
@@ -152,7 +154,7 @@ class ContactReader:
         return self._arms.get(name, ROBOT_NAME) if self._roles[body] < Role.TARGET else name
 
     def unplanned(
-        self, contacts: Iterable[physx.PhysxContact], *, in_hand: bool, meant: MeantContacts = NONE_MEANT
+        self, contacts: Iterable[physx.PhysxContact], *, in_hand: bool, meant: AllowedContacts = NONE_MEANT
     ) -> set[tuple[str, str]]:
         """Return the pairs of names in unplanned contact with more than the allowed force, the robot's part first.
 
@@ -199,7 +201,7 @@ def _is_of_target(one: Role, other: Role) -> bool:
     return min(one, other) == Role.TARGET
 
 
-def _fingers(part: Role, meant: MeantContacts) -> frozenset[str]:
+def _fingers(part: Role, meant: AllowedContacts) -> frozenset[str]:
     return meant.fingers if part <= Role.MINUS_FINGER else frozenset()
 
 

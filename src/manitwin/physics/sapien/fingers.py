@@ -21,7 +21,7 @@ from manitwin.physics.sapien.shapes import COOKED, HullShapes
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import run_phases
 from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
-from manitwin.robots.grippers.gripper import Gripper, of_kind
+from manitwin.robots.grippers.gripper import Gripper, require_kind
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 
 # Shapes with a common bit in the third word do not collide. The palm shares one bit with the thumb and one with the other
@@ -47,7 +47,7 @@ class ArticulatedTrial:
 
         The ratio of ``settings.force_n`` to the gripper's own force scales the torques with which its joints press.
         """
-        hand = of_kind(gripper, MultiFingerGripper)
+        hand = require_kind(gripper, MultiFingerGripper)
         with COOKED.lent([body.hulls]) as (shapes,):
             return [
                 _try_one(body, shapes, hand, pose, joints, settings)
@@ -63,7 +63,7 @@ class ArticulatedTrial:
         joints_rad: np.ndarray | None = None,
     ) -> TrialRecording:
         """Try one grasp ``gripper_to_object (4, 4)`` with ``joints_rad (2, J)`` as ``run`` does, and return its states."""
-        hand, recorder = of_kind(gripper, MultiFingerGripper), TrialRecorder()
+        hand, recorder = require_kind(gripper, MultiFingerGripper), TrialRecorder()
         joints = _required(joints_rad, hand)
         with COOKED.lent([body.hulls]) as (shapes,):
             result = _try_one(body, shapes, hand, gripper_to_object, joints, settings, recorder)
@@ -120,7 +120,7 @@ class FingerClosing:
         self._step, self._come = step_rad / np.maximum(way_rad, step_rad), np.zeros(fingers)
         self.all_press = False
 
-    def move_on(self, positions_rad: np.ndarray) -> np.ndarray:
+    def advance_targets(self, positions_rad: np.ndarray) -> np.ndarray:
         """Advance the targets of all fingers that do not press yet by one frame, and return all targets ``(J,)``."""
         torque_nm = np.abs(self._stiffness * (self.target_rad - positions_rad))
         presses = [
@@ -181,7 +181,7 @@ class FingeredHand:
 
     def squeeze(self) -> None:
         """Advance the targets of all fingers that do not press yet."""
-        self._drive_to(self._closing.move_on(np.asarray(self.articulation.get_qpos())))
+        self._drive_to(self._closing.advance_targets(np.asarray(self.articulation.get_qpos())))
 
     def presses(self) -> bool:
         """Tell whether every finger presses or has reached its goal."""

@@ -47,7 +47,9 @@ class GranuleFill:
         return float(len(self.centers_m) * 4 / 3 * np.pi * self.radius_m**3 / PACKING)
 
 
-def fill(name: str, opening: Opening, hulls: Sequence[np.ndarray], rng: np.random.Generator) -> GranuleFill | None:
+def create_granule_fill(
+    name: str, opening: Opening, hulls: Sequence[np.ndarray], rng: np.random.Generator
+) -> GranuleFill | None:
     """Return 60 granules for a vessel, or fewer if they would be too small; None if it has no room for ten.
 
     They fill ``FILL_SHARE`` of its volume and start in a loose lattice above its floor, clear of its ``hulls``, each

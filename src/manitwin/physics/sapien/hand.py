@@ -116,7 +116,7 @@ class FixedHand:
             return
         plus, minus = self.fingers
         mean_m = (plus.entity_pose.p[0] - minus.entity_pose.p[0]) / 2
-        self.close_to(self._target.move_on(float(mean_m)))
+        self.close_to(self._target.advance_target(float(mean_m)))
 
     def presses(self) -> bool:
         """Tell whether the target is far enough ahead of the fingers to press with the closing force."""

@@ -14,7 +14,7 @@ from manitwin.physics.sapien.shapes import HAND_COLLISION_GROUPS, SECOND_ARM_COL
 from manitwin.physics.sapien.visuals import add_robot_visuals
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.suction import SuctionGripper
-from manitwin.robots.links import Link, bodies_of_urdf
+from manitwin.robots.links import Link, read_rigid_bodies
 from manitwin.robots.robot import Robot
 
 # Trajectories are tracked within 0.003 rad with velocity feed-forward. 50 solver iterations and 50 N held 298 of 304 objects
@@ -61,7 +61,7 @@ class SapienRobot:
         self.robot = robot
         self._scene = scene  # kept alive: bodies are destroyed with their scene
         friction = robot.gripper.finger_friction if finger_friction is None else finger_friction
-        bodies, part_of = bodies_of_urdf(robot.urdf, robot.hand_links[0])
+        bodies, part_of = read_rigid_bodies(robot.urdf, robot.hand_links[0])
         pads = physx.PhysxMaterial(friction, friction, 0.0)
         self.links = build_articulation(
             scene, bodies, lambda link: _contact_of(robot, link, pads, second=second), contact_offset_m=contact_offset_m

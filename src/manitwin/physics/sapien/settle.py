@@ -82,7 +82,7 @@ class RestWatch:
 
 
 @dataclass(frozen=True)
-class Rest:
+class RestState:
     """Bodies after settling: ``object_to_world (N, 4, 4)``, ``at_rest (N,)``, and the number of steps.
 
     ``lost (N,)`` marks bodies that moved so far that settling was aborted.
@@ -103,7 +103,7 @@ def settle(
     at_least_s: float = 0.0,
     limits: RestLimits = RestLimits(),
     give_up_m: Sequence[float] | None = None,
-) -> Rest:
+) -> RestState:
     """Step until all bodies are at rest, for at least ``at_least_s`` and at most ``seconds``.
 
     ``give_up_m`` is the displacement of each body's origin at which settling is aborted.
@@ -121,11 +121,11 @@ def settle(
             lost = np.linalg.norm((now - watch.start)[:, :3, 3], axis=1) > limits_m
             if (done >= least and watch.all_rest) or lost.any():
                 break
-    return Rest(poses_of(bodies), watch.looks > 0, lost, done)
+    return RestState(poses_of(bodies), watch.looks > 0, lost, done)
 
 
 @dataclass(frozen=True)
-class Settled:
+class SettledBody:
     """A body after it was set down: pose, displacement of its centre of mass, and whether it is at rest.
 
     The displacement is relative to the pose without the drop height.
@@ -136,10 +136,10 @@ class Settled:
     at_rest: bool
 
     @staticmethod
-    def of(body: RigidBody, start: np.ndarray, end: np.ndarray, at_rest: bool) -> Settled:
+    def of(body: RigidBody, start: np.ndarray, end: np.ndarray, at_rest: bool) -> SettledBody:
         """Return the result for the initial and final pose ``(4, 4)`` of the object frame."""
         before, after = (transform_points(p, body.center_of_mass_m[None])[0] for p in (start, end))
-        return Settled(end, float(np.linalg.norm(after - before)), at_rest)
+        return SettledBody(end, float(np.linalg.norm(after - before)), at_rest)
 
 
 def settle_on_plane(
@@ -149,7 +149,7 @@ def settle_on_plane(
     drop_m: float,
     seconds: float,
     timestep_s: float = TIMESTEP_S,
-) -> list[Settled]:
+) -> list[SettledBody]:
     """Release a body ``drop_m`` above the plane z = 0 in each of several poses ``(4, 4)`` and simulate until it rests.
 
     All copies share one scene, far enough apart never to touch. Ends when all are at rest, after ``seconds`` at the latest.
@@ -171,13 +171,13 @@ def settle_on_plane(
     rest = settle(scene.physx_system, bodies, timestep_s=timestep_s, seconds=seconds)
     rest.object_to_world[:, :2, 3] -= np.array(offsets)[:, :2]
     return [
-        Settled.of(body, pose, end, bool(at_rest))
+        SettledBody.of(body, pose, end, bool(at_rest))
         for pose, end, at_rest in zip(object_to_plane, rest.object_to_world, rest.at_rest, strict=True)
     ]
 
 
 @dataclass(frozen=True)
-class SettledScene(Rest):
+class SettledScene(RestState):
     """A scene after its objects came to rest.
 
     ``touching`` maps pairs of names (objects and boxes) in contact, in order of addition, to the deepest overlap (m, 0 if

@@ -17,7 +17,7 @@ from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import run_brief_phases, run_phases
 from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
-from manitwin.robots.grippers.gripper import Gripper, of_kind
+from manitwin.robots.grippers.gripper import Gripper, require_kind
 from manitwin.robots.grippers.hand_clearance import HandReach
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.grasp_summary import Outcome
@@ -59,8 +59,8 @@ class SapienTrial:
         """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order."""
         from manitwin.physics.sapien.shapes import COOKED
 
-        hand, reach = of_kind(gripper, ParallelGripper), HandReach(body.hulls)
-        settings = finer_for_what_is_light(settings, body.mass_kg)
+        hand, reach = require_kind(gripper, ParallelGripper), HandReach(body.hulls)
+        settings = with_timestep_for_mass(settings, body.mass_kg)
         with COOKED.lent([body.hulls]) as (shapes,):
             grasps = (_Grasp(body, shapes, reach, hand, inverse(pose)) for pose in gripper_to_object)
             return [_verdict(grasp, settings) for grasp in grasps]
@@ -76,18 +76,18 @@ class SapienTrial:
         """Try one grasp ``gripper_to_object (4, 4)`` as ``run`` does, and return its states."""
         from manitwin.physics.sapien.shapes import COOKED
 
-        hand, reach, recorder = of_kind(gripper, ParallelGripper), HandReach(body.hulls), TrialRecorder()
+        hand, reach, recorder = require_kind(gripper, ParallelGripper), HandReach(body.hulls), TrialRecorder()
         object_to_hand = inverse(gripper_to_object)
-        settings = finer_for_what_is_light(settings, body.mass_kg)
+        settings = with_timestep_for_mass(settings, body.mass_kg)
         with COOKED.lent([body.hulls]) as (shapes,):
             result = _verdict(_Grasp(body, shapes, reach, hand, object_to_hand), settings, recorder)
         return recorder.recording(result, object_to_hand, np.full(2, hand.opening_m / 2))
 
 
-def finer_for_what_is_light(settings: TrialSettings, mass_kg: float) -> TrialSettings:
+def with_timestep_for_mass(settings: TrialSettings, mass_kg: float) -> TrialSettings:
     """Return settings whose time step is halved until F dt / m is at most ``MOST_JUMP_M_S``, down to ``LEAST_TIMESTEP_S``."""
     while settings.force_n * settings.timestep_s > MOST_JUMP_M_S * mass_kg and _may_be_halved(settings):
-        settings = _with_half_the_step(settings)
+        settings = _with_half_timestep(settings)
     return settings
 
 
@@ -95,7 +95,7 @@ def _may_be_halved(settings: TrialSettings) -> bool:
     return settings.timestep_s / 2 > 0.999 * LEAST_TIMESTEP_S
 
 
-def _with_half_the_step(settings: TrialSettings) -> TrialSettings:
+def _with_half_timestep(settings: TrialSettings) -> TrialSettings:
     return replace(
         settings,
         timestep_s=settings.timestep_s / 2,
@@ -107,7 +107,7 @@ def _with_half_the_step(settings: TrialSettings) -> TrialSettings:
 def _reference(settings: TrialSettings) -> TrialSettings:
     """Return the settings with the smallest time step and at least the reference's iterations."""
     while _may_be_halved(settings):
-        settings = _with_half_the_step(settings)
+        settings = _with_half_timestep(settings)
     return replace(settings, solver_iterations=max(settings.solver_iterations, REFERENCE_ITERATIONS))
 
 
@@ -177,4 +177,4 @@ def _try_once(
 def _stayed_out(reach: HandReach, gaps: np.ndarray, gripper: ParallelGripper, looks: np.ndarray) -> bool:
     """Tell whether no omitted hull came near the hand at any recorded pose ``(P, 4, 4)``; the cheap bound is tested first."""
     unsure = (gaps > REACH_MARGIN_M) & (gaps - reach.motions_m(looks) <= LOOK_MARGIN_M)
-    return not unsure.any() or not (reach.of(unsure).gaps_m(gripper, looks) <= LOOK_MARGIN_M).any()
+    return not unsure.any() or not (reach.subset(unsure).gaps_m(gripper, looks) <= LOOK_MARGIN_M).any()

@@ -14,14 +14,14 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, RigidBody, StaticBox, stands_for_a_plane
+from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, RigidBody, StaticBox, is_plane_equivalent
 from manitwin.physics.sapien.body import entity_at, graspable_component, iterations_beside, static_box, static_plane
 from manitwin.physics.sapien.contacts import ContactReader, Role
-from manitwin.physics.sapien.falling import Falling
+from manitwin.physics.sapien.free_fall import FreeFallLimiter
 from manitwin.physics.sapien.granules import FALL_S, GranuleFill, Granules
 from manitwin.physics.sapien.robot import SapienRobot
 from manitwin.physics.sapien.scene import system_with_gravity
-from manitwin.physics.sapien.settle import Rest, RestLimits, RestWatch, settle
+from manitwin.physics.sapien.settle import RestLimits, RestState, RestWatch, settle
 from manitwin.physics.sapien.shapes import COOKED, HullShapes
 from manitwin.robots.robot import Robot
 
@@ -69,7 +69,7 @@ class RobotWorld:
         self._iterations, self._iterations_held = solver_iterations, solver_iterations_held
         self.placed = sorted((target, *others), key=lambda placed: placed.name)
         self.target = self.placed.index(target)
-        self.will_hold({target.name})
+        self.set_held_objects({target.name})
         self._system = system_with_gravity(timestep_s)
         self._scene = sapien.Scene([self._system])
         standing = [*boxes, *fixtures]
@@ -93,7 +93,10 @@ class RobotWorld:
             for number, arm in enumerate(robot.arms or (robot,))
         )
         self.robot = self.robots[0]
-        self._falling, self._expects_load = Falling(self.bodies, timestep_s, contact_offset_m=contact_offset_m), False
+        self._falling, self._expects_load = (
+            FreeFallLimiter(self.bodies, timestep_s, contact_offset_m=contact_offset_m),
+            False,
+        )
         self.expect_load(False)
         self._fixed = [
             (surface, box.name, role) for surface, box, role in zip(surfaces, standing, bearing, strict=True)
@@ -122,7 +125,7 @@ class RobotWorld:
         )
         self._loan.__exit__(kind, error, trace)
 
-    def add_strangers(self, entities: Sequence[sapien.Entity]) -> None:
+    def add_ignored_bodies(self, entities: Sequence[sapien.Entity]) -> None:
         """Add bodies without name or role; contact reading ignores them."""
         for entity in entities:
             self._scene.add_entity(entity)
@@ -133,7 +136,7 @@ class RobotWorld:
         """Put granules into their vessel and let them fall for ``FALL_S``."""
         number = [placed.name for placed in self.placed].index(fill.name)
         self.granules = Granules(fill, self.object_to_world(number))
-        self.add_strangers(self.granules.entities)
+        self.add_ignored_bodies(self.granules.entities)
         self.step(round(FALL_S / self.timestep_s))
 
     def step(self, count: int = 1) -> None:
@@ -154,11 +157,11 @@ class RobotWorld:
             # also applies to everything that touches the robot
             robot.articulation.set_solver_position_iterations(iterations)
 
-    def will_hold(self, names: Collection[str]) -> None:
+    def set_held_objects(self, names: Collection[str]) -> None:
         """Declare which objects the hand will hold in turn; by default the target alone."""
         self._holds_slender = any(_is_slender(placed.body) for placed in self.placed if placed.name in names)
 
-    def take(self, number: int) -> None:
+    def set_target(self, number: int) -> None:
         """Make another object the target."""
         self.target = number
         strangers, used = self.contacts.has_strangers, self.robots.index(self.robot)
@@ -167,7 +170,7 @@ class RobotWorld:
             reader.has_strangers = strangers
         self.contacts = self.readers[used]
 
-    def use(self, arm: int) -> None:
+    def select_arm(self, arm: int) -> None:
         """Select the arm, by number, that ``robot`` and ``contacts`` refer to."""
         self.robot, self.contacts = self.robots[arm], self.readers[arm]
 
@@ -179,7 +182,7 @@ class RobotWorld:
         """Return the pose ``(4, 4)`` of an object's frame by name."""
         return self.object_to_world([placed.name for placed in self.placed].index(name))
 
-    def settle(self, seconds: float) -> Rest:
+    def settle(self, seconds: float) -> RestState:
         """Step until the objects rest; the robot holds its targets."""
         return settle(self._system, self.bodies, timestep_s=self.timestep_s, seconds=seconds, limits=RESTS)
 
@@ -191,7 +194,7 @@ class RobotWorld:
         offset_m = self._contact_offset_m
         entity = (
             static_plane(friction, friction, contact_offset_m=offset_m, name=box.name)
-            if stands_for_a_plane(box)
+            if is_plane_equivalent(box)
             else static_box(box, contact_offset_m=offset_m, friction=friction)
         )
         self._scene.add_entity(entity)
@@ -222,7 +225,7 @@ class RobotWorld:
             roles.append((body, placed.name, Role.TARGET if number == self.target else Role.OTHER))
         for each in self.robots:
             for name, link in each.links.items():
-                side = each.robot.side_of(name) if each is used else None
+                side = each.robot.contact_side(name) if each is used else None
                 hand = Role.HAND if name in each.robot.hand_links else Role.ARM
                 roles.append((link, name, hand if side is None else Role(side)))
         return roles

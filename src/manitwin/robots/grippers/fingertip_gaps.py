@@ -24,7 +24,7 @@ class Fingertips:
                 )
             self.links.append(max(shaped, key=lambda index: _depth(hand, index)))
         self._corners_m = [
-            np.concatenate([shape.solid().vertices for shape in hand.links[index].shapes]) for index in self.links
+            np.concatenate([shape.to_mesh().vertices for shape in hand.links[index].shapes]) for index in self.links
         ]
 
     def bounds_m(self, joints_rad: np.ndarray) -> np.ndarray:

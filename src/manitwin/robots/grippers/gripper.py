@@ -14,7 +14,7 @@ from typing import Any, Protocol, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.toml_file import MAX_TOML_BYTES, parse_toml
 from manitwin.robots.grippers.box import PlacedBox
@@ -82,7 +82,7 @@ class Gripper(Protocol):
         ...
 
 
-def of_kind(gripper: Gripper, kind: type[Kind]) -> Kind:
+def require_kind(gripper: Gripper, kind: type[Kind]) -> Kind:
     """Return the gripper if it is of class ``kind``; raises UsageError otherwise."""
     if not isinstance(gripper, kind):
         raise UsageError(f"gripper {gripper.name} is of the kind {gripper.kind}, not a {kind.__name__}; choose another")
@@ -146,13 +146,13 @@ def load_gripper(name_or_path: str | Path, *, checked: bool = True) -> Gripper:
         )
     else:
         if name_or_path not in shipped_grippers():
-            raise UsageError(f"{choose_from('gripper', name_or_path, shipped_grippers())}, or a .toml file")
+            raise UsageError(f"{unknown_name_message('gripper', name_or_path, shipped_grippers())}, or a .toml file")
         path = _shipped_folder() / f"{name_or_path}.toml"
     content = read_bytes(path, MAX_TOML_BYTES, UsageError, name=f"gripper file {path}")
     data = parse_toml(content, f"gripper file {path}", UsageError)
     kind = data.pop("kind", None)
     if kind not in KINDS:
-        raise UsageError(f"gripper file {path}: {choose_from('kind', str(kind), KINDS)}")
+        raise UsageError(f"gripper file {path}: {unknown_name_message('kind', str(kind), KINDS)}")
     data["sha256"] = hashlib.sha256(content).hexdigest()
     try:
         gripper = KINDS[kind](data, path.parent, checked)

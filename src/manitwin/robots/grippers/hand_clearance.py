@@ -94,7 +94,7 @@ class HandReach:
         low, high = np.minimum.reduceat(self._corners, self._starts), np.maximum.reduceat(self._corners, self._starts)
         self._centers, self._radii_m = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
 
-    def of(self, some: np.ndarray) -> HandReach:
+    def subset(self, some: np.ndarray) -> HandReach:
         """Return the ``HandReach`` of a subset of the hulls, ``some (H,)`` bool."""
         return HandReach(tuple(self._hulls[index] for index in np.flatnonzero(some)))
 

@@ -56,7 +56,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class HandNumbers:
+class HandParameters:
     """Fields of the gripper file that are used unchanged."""
 
     name: Name
@@ -73,7 +73,7 @@ class HandNumbers:
 
 
 @dataclass(frozen=True)
-class MultiFingerGripper(HandNumbers):
+class MultiFingerGripper(HandParameters):
     """Hand with a thumb and fingers. Grasp frame: +Z out of the palm, the fingers on +X, the thumb on -X.
 
     ``joints (J,)`` names the joints in the order of all postures and of a twin's grasp table. ``fingers`` names the links of

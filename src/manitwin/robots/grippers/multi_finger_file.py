@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, TypeAdapter
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.xml_file import MAX_XML_BYTES
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.robots.grippers.box import STRICT
-from manitwin.robots.grippers.coupled_joints import Coupling, couplings_of, with_followers
 from manitwin.robots.grippers.fingertip_gaps import Fingertips
-from manitwin.robots.grippers.multi_finger import HandNumbers, MultiFingerGripper, Posture, find_mesh
+from manitwin.robots.grippers.mimic_joints import MimicJoint, read_mimic_joints, with_mimic_positions
+from manitwin.robots.grippers.multi_finger import HandParameters, MultiFingerGripper, Posture, find_mesh
 from manitwin.robots.grippers.posture_checks import check_closing, check_fingers, check_positions, measured_posture
 from manitwin.robots.grippers.quantities import Length, Position, Rotation
-from manitwin.robots.links import Link, links_of
+from manitwin.robots.links import Link, read_links
 from manitwin.robots.urdf_reader import HAND, read_urdf
 from manitwin.twin.point_records import GraspType
 
@@ -60,7 +60,7 @@ class _PostureField:
 
 
 @dataclass(frozen=True)
-class _File(HandNumbers):
+class _File(HandParameters):
     """Schema of a multi-finger gripper file."""
 
     __pydantic_config__ = STRICT
@@ -82,19 +82,19 @@ def load_multi_finger(data: dict[str, Any], folder: Path, checked: bool) -> Mult
     def find(mesh: str) -> Path:
         return meshes.setdefault(mesh, find_mesh(path, root, mesh))
 
-    links, couplings = links_of(tree, find), couplings_of(tree)
+    links, couplings = read_links(tree, find), read_mimic_joints(tree)
     _check_names(file, links, couplings)
     _check_drive(file)
     postures, joints = [], file.joints
     for number, posture in enumerate(file.postures):
         openings_m, rows = _rows(f"postures.{number}", posture, len(file.joints))
-        joints, rows = with_followers(file.joints, rows, links, couplings)
+        joints, rows = with_mimic_positions(file.joints, rows, links, couplings)
         depth_m = (min(posture.depth_m), max(posture.depth_m))
         if posture.depth_m != depth_m:
             raise ValueError(f"postures.{number}.depth_m: descends; give the nearest depth, then the farthest")
         as_rows = tuple(map(tuple, rows.tolist()))
         postures.append(Posture(posture.name, posture.grasp_types, depth_m, openings_m, as_rows))
-    described = {field.name: getattr(file, field.name) for field in fields(HandNumbers)}
+    described = {field.name: getattr(file, field.name) for field in fields(HandParameters)}
     described |= {"sha256": _digest(file.sha256, path, meshes), "joints": joints}
     rotation = rotation_from_quaternion_wxyz(np.array(file.root_to_gripper.quaternion_wxyz))
     root_to_gripper = transform(rotation, np.array(file.root_to_gripper.position_m))
@@ -106,10 +106,10 @@ def load_multi_finger(data: dict[str, Any], folder: Path, checked: bool) -> Mult
         urdf_path=path,
         urdf_root=root,
     )
-    return _settled(hand) if checked else hand
+    return _with_checked_postures(hand) if checked else hand
 
 
-def _settled(hand: MultiFingerGripper) -> MultiFingerGripper:
+def _with_checked_postures(hand: MultiFingerGripper) -> MultiFingerGripper:
     """Return the hand with all postures checked, and openings measured where the file omits them."""
     check_fingers(hand)
     tips = Fingertips(hand)
@@ -189,12 +189,12 @@ def _urdf_path(name: str, urdf: _UrdfField, folder: Path) -> tuple[Path, Path]:
     return path, path.parent.parent
 
 
-def _check_names(file: _File, links: tuple[Link, ...], couplings: dict[str, Coupling]) -> None:
+def _check_names(file: _File, links: tuple[Link, ...], couplings: dict[str, MimicJoint]) -> None:
     """Raise ValueError if a joint or link name is not in the URDF, or if a movable joint is missing."""
     moving = [link.joint for link in links if link.joint_type != "fixed"]
     for name in file.joints:
         if name not in moving:
-            raise ValueError(f"joints: {choose_from('joint', name, moving)}")
+            raise ValueError(f"joints: {unknown_name_message('joint', name, moving)}")
     if len(set(file.joints)) < len(file.joints):
         raise ValueError("joints: a joint is listed twice; list each once")
     left_out = [name for name in moving if name not in file.joints and name not in couplings]
@@ -206,7 +206,7 @@ def _check_names(file: _File, links: tuple[Link, ...], couplings: dict[str, Coup
     names = [link.name for link in links]
     for name in (name for finger in file.fingers for name in finger):
         if name not in names:
-            raise ValueError(f"fingers: {choose_from('link', name, names)}")
+            raise ValueError(f"fingers: {unknown_name_message('link', name, names)}")
     if not file.postures:
         raise ValueError("postures: the list is empty; give at least one")
 

@@ -43,13 +43,13 @@ def posture_gaps_m(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
     most.
     """
     gaps_m = np.array([tips.gaps_m(row) for row in joints_rad])
-    return np.asarray(gaps_m[:, _taking_part(tips, joints_rad)].min(axis=1))
+    return np.asarray(gaps_m[:, _active_fingers(tips, joints_rad)].min(axis=1))
 
 
 def posture_reach_m(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
     """Return how far along +Z both the thumb and the active fingers reach, for each row, ``(K,)``."""
     reach_m = np.array([tips.reach_m(row) for row in joints_rad])
-    return np.minimum(reach_m[:, 0], reach_m[:, 1:][:, _taking_part(tips, joints_rad)].max(axis=1))
+    return np.minimum(reach_m[:, 0], reach_m[:, 1:][:, _active_fingers(tips, joints_rad)].max(axis=1))
 
 
 def opposition_tilt_rad(tips: Fingertips, joints_rad: np.ndarray) -> float:
@@ -58,11 +58,11 @@ def opposition_tilt_rad(tips: Fingertips, joints_rad: np.ndarray) -> float:
     Rotating ``root_to_gripper`` by this angle about Y aligns the line with X, the closing direction.
     """
     centers_m = tips.centers_m(joints_rad[len(joints_rad) // 2])
-    across_m = centers_m[1:][_taking_part(tips, joints_rad)].mean(0) - centers_m[0]
+    across_m = centers_m[1:][_active_fingers(tips, joints_rad)].mean(0) - centers_m[0]
     return float(np.arctan2(across_m[2], across_m[0]))
 
 
-def _taking_part(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
+def _active_fingers(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
     """Tell which fingers except the thumb are active, ``(F - 1,)`` bool."""
     moved = np.ptp(np.array([tips.centers_m(row) for row in (joints_rad[0], joints_rad[-1])]), axis=0)
     travel = np.linalg.norm(moved[1:], axis=-1)

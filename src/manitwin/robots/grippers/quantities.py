@@ -48,7 +48,7 @@ def _vacuum(value: float) -> float:
     return value
 
 
-def _of_unit_length(value: tuple[float, ...]) -> tuple[float, ...]:
+def _unit_quaternion(value: tuple[float, ...]) -> tuple[float, ...]:
     if abs(np.linalg.norm(value) - 1) > UNIT_TOLERANCE:
         raise ValueError("a rotation is a quaternion wxyz of length 1")
     return value
@@ -61,7 +61,7 @@ def _name(value: str) -> str:
     return value
 
 
-def _said(value: str) -> str:
+def _source_text(value: str) -> str:
     if not value.strip():
         raise ValueError("is empty: give the source of the numbers; it is stored with every twin")
     return value
@@ -77,7 +77,7 @@ Gap = Annotated[float, AfterValidator(_number(0, MAX_LENGTH_M, _METRES, least_to
 """Non-negative length in metres."""
 Position = Annotated[float, AfterValidator(_position)]
 """Coordinate in metres."""
-Rotation = Annotated[tuple[float, float, float, float], AfterValidator(_of_unit_length)]
+Rotation = Annotated[tuple[float, float, float, float], AfterValidator(_unit_quaternion)]
 """Unit quaternion wxyz."""
 Positive = Annotated[float, AfterValidator(_number(0, np.inf, _SENSE))]
 """Positive number: a force, a friction coefficient, a gain or a speed."""
@@ -89,4 +89,4 @@ Slope = Annotated[float, AfterValidator(_number(0, np.pi / 2, _RADIANS, least_to
 Vacuum = Annotated[float, AfterValidator(_vacuum)]
 """Pressure difference in pascals."""
 Name = Annotated[str, AfterValidator(_name)]
-Source = Annotated[str, AfterValidator(_said)]
+Source = Annotated[str, AfterValidator(_source_text)]

@@ -18,10 +18,10 @@ from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
 from manitwin.errors import Rejected
-from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.layouts.pool import cached_pool
 from manitwin.scenes.layouts.sample import sample_layout
 from manitwin.scenes.scene import SCENE
-from manitwin.scenes.scene_files import parse_scene, read_scene, scene_name, scene_there, write_scene
+from manitwin.scenes.scene_files import parse_scene, read_scene, read_scene_content, scene_name, write_scene
 from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
@@ -71,12 +71,12 @@ class LayoutStage:
 
     def run(self, draft: Draft[LayoutNumber], folder: Path) -> dict[str, Any]:
         """Write the scene; raises Rejected if sampling failed, UsageError if a newer version wrote the existing one."""
-        there = None if self._out is None else scene_there(self._out, draft.item_id)
+        there = None if self._out is None else read_scene_content(self._out, draft.item_id)
         if there is not None:
             (folder / SCENE).write_bytes(there)
             return {}
         number = draft.payload.number
-        write_scene(sample_layout(pool_of(self._dataset), self._layout, draft.seed, number), folder)
+        write_scene(sample_layout(cached_pool(self._dataset), self._layout, draft.seed, number), folder)
         return {}
 
 
@@ -170,7 +170,7 @@ class LayoutsRecipe(FolderRecipe[LayoutRecord]):
             "reason": None if rejected is None else rejected.reason,
             "detail": detail,
         }
-        return self.seal(fresh, said, decided_by=scene_bytes.decode())
+        return self.write_record(fresh, said, decided_by=scene_bytes.decode())
 
     def ending(self, record: LayoutRecord) -> Ending:
         """Return the outcome stated in a layout's record."""

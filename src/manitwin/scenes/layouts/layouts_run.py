@@ -15,14 +15,14 @@ from manitwin.engine.drive import RunOptions, RunReport, drive
 from manitwin.engine.ledger.location import CONFIG, local_ledger
 from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
+from manitwin.scenes.changed_twins import find_changed_twins
 from manitwin.scenes.layouts.layouts_recipe import LayoutNumber, LayoutsRecipe
-from manitwin.scenes.layouts.pool import Pool, pool_of
-from manitwin.scenes.layouts.slot_drawing import least_objects
+from manitwin.scenes.layouts.pool import Pool, cached_pool
+from manitwin.scenes.layouts.slot_sampling import least_objects
 from manitwin.scenes.run_settings import check_settings, earlier_settings
 from manitwin.scenes.scene import SCENE, SceneRecord
-from manitwin.scenes.scene_files import parse_scene, scene_name, scene_there
+from manitwin.scenes.scene_files import parse_scene, read_scene_content, scene_name
 from manitwin.scenes.settings import LayoutsConfig
-from manitwin.scenes.twins_now import changed_twins
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.record_digests import TwinState
 
@@ -65,10 +65,10 @@ def make_layouts(
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} layouts; ask for 1 or more, at most {LARGEST_COUNT}")
     place = DatasetRoot(dataset).absolute()
-    pool = pool_of(place)
+    pool = cached_pool(place)
     least_objects(pool.upright if config.layout.upright else pool, config.layout)
     root = DatasetRoot(out)
-    config = _with_pictures_there(config, earlier_settings(root), root.url)
+    config = _with_earlier_pictures(config, earlier_settings(root), root.url)
     recipe = LayoutsRecipe(config, place, root.absolute())
     configuration = {"kind": "layouts", "dataset": place, **config.model_dump(mode="json")}
     check_settings(root, configuration, free=DECIDE_NO_SCENE, made="scenes")
@@ -96,23 +96,23 @@ def _stale_scenes(root: DatasetRoot, pool: Pool) -> list[str]:
     def there() -> Iterator[SceneRecord]:
         for scene_id in accepted_scenes(root.url):
             with suppress(UsageError):  # of a newer version, which the run reports
-                if (content := scene_there(root, scene_id)) is not None:
+                if (content := read_scene_content(root, scene_id)) is not None:
                     yield parse_scene(content)
 
     def now(twin_id: str) -> TwinState | None:
         twin = pool.find(twin_id)
         return None if twin is None else TwinState(twin.revision, twin.body_sha256 or "", twin.grippers)
 
-    found = changed_twins(there(), now)
-    if found.line is None:
+    found = find_changed_twins(there(), now)
+    if found.changed_remark is None:
         return [] if found.remark is None else [found.remark]
     return [
-        f"{found.line}, which are left unchanged, but rejected by tasks and episodes; sample the layouts again into"
+        f"{found.changed_remark}, which are left unchanged, but rejected by tasks and episodes; sample the layouts again into"
         f" a new folder"
     ]
 
 
-def _with_pictures_there(config: LayoutsConfig, before: dict[str, Any], place: str) -> LayoutsConfig:
+def _with_earlier_pictures(config: LayoutsConfig, before: dict[str, Any], place: str) -> LayoutsConfig:
     """Return a configuration that renders scenes if an earlier run did, so that its pictures are not lost."""
     if config.pictures or not before.get("pictures"):
         return config
@@ -125,9 +125,11 @@ def _with_pictures_there(config: LayoutsConfig, before: dict[str, Any], place: s
         ) from error
 
 
-def without_upright(dataset: str | Path) -> tuple[str, ...]:
+def twins_without_upright(dataset: str | Path) -> tuple[str, ...]:
     """Return the ids of a data set's twins that have no upright placement; ``upright`` layouts place them as they rest."""
-    return tuple(twin.twin_id for twin in pool_of(DatasetRoot(dataset).absolute()).twins if not twin.stands)
+    return tuple(
+        twin.twin_id for twin in cached_pool(DatasetRoot(dataset).absolute()).twins if not twin.has_upright_pose
+    )
 
 
 def accepted_scenes(out: str | Path) -> list[str]:

@@ -13,7 +13,7 @@ from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import StaticBox
 from manitwin.robots.robot import Workspace
 from manitwin.scenes.layouts.pool import PoolBody, StandingPose
-from manitwin.scenes.layouts.slots import Put
+from manitwin.scenes.layouts.slots import SupportedPose
 from manitwin.scenes.scene import SupportRegion
 from manitwin.scenes.settings import LayoutSettings
 
@@ -125,17 +125,17 @@ class Obstacles:
         return is_clear_of(parts, self.above(height_m), gap_m)
 
 
-def draw_pose(poses: Sequence[StandingPose], rng: np.random.Generator) -> StandingPose:
+def sample_pose(poses: Sequence[StandingPose], rng: np.random.Generator) -> StandingPose:
     """Draw one of a twin's placements by their probabilities."""
     weights = np.array([pose.probability for pose in poses])
     weights = weights / weights.sum() if weights.sum() > 0 else np.full(len(weights), 1 / len(weights))
     return poses[int(rng.choice(len(weights), p=weights))]
 
 
-def put_on_surface(
+def place_on_surface(
     body: PoolBody, poses: Sequence[StandingPose], patch: Patch, obstacles: Obstacles, *, gap_m: float, tries: int,
     rng: np.random.Generator,
-) -> Put | None:  # fmt: skip
+) -> SupportedPose | None:  # fmt: skip
     """Return a free pose of a twin in a patch, in one of these placements, or None after ``tries`` positions.
 
     The centre of its collision circle is drawn in the patch, its heading uniformly. Its hulls stay within the support.
@@ -143,19 +143,19 @@ def put_on_surface(
     for number in range(tries):
         if number % GROW_AFTER == GROW_AFTER - 1:
             patch.grow()
-        stands = draw_pose(poses, rng)
+        stands = sample_pose(poses, rng)
         position = patch.position(rng)
         if position is None:
             patch.grow()
             continue
-        object_to_world = on_plane(stands, position, patch.support.height_m, rng.uniform(-np.pi, np.pi))
+        object_to_world = pose_on_plane(stands, position, patch.support.height_m, rng.uniform(-np.pi, np.pi))
         parts = body.parts.at(object_to_world)
         if is_within(parts, patch.support) and obstacles.is_clear(parts, patch.support.height_m, gap_m):
-            return Put(patch.support.name, stands.placement, parts)
+            return SupportedPose(patch.support.name, stands.placement, parts)
     return None
 
 
-def on_plane(pose: StandingPose, position_m: np.ndarray, height_m: float, heading_rad: float) -> np.ndarray:
+def pose_on_plane(pose: StandingPose, position_m: np.ndarray, height_m: float, heading_rad: float) -> np.ndarray:
     """Return ``object_to_world`` of a placement on the plane at a height, with its circle's centre at a position ``(2,)``."""
     turn = Rotation.from_rotvec([0, 0, heading_rad]).as_matrix()
     plane_to_world = transform(turn, np.array([*position_m, height_m]))

@@ -20,8 +20,8 @@ from manitwin.geometry.rigid_body import RigidBody
 from manitwin.scenes.layouts.twin_frames import LabelledPoint, TwinFrame, twin_frames
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.record import Placement
-from manitwin.twin.record_digests import state_of
-from manitwin.twin.store import RECORD, REMEDY, in_present_version, parse_record
+from manitwin.twin.record_digests import twin_state
+from manitwin.twin.store import RECORD, REMEDY, migrate_content, parse_record
 
 KEPT_BODIES = 256
 
@@ -59,7 +59,7 @@ class PoolTwin:
     grippers: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def stands(self) -> bool:
+    def has_upright_pose(self) -> bool:
         """True if one of its placements is upright."""
         return any(pose.upright for pose in self.poses)
 
@@ -128,7 +128,7 @@ class Pool:
         return found
 
     @property
-    def about_joints(self) -> str | None:
+    def joints_remark(self) -> str | None:
         """A line on the twins with joints, which are locked in scenes and episodes; None if there are none."""
         jointed = sum(twin.jointed for twin in self.twins)
         return f"twins with joints, each one rigid body here as it stands: {jointed}" if jointed else None
@@ -137,7 +137,7 @@ class Pool:
     def upright(self) -> Pool:
         """A pool of the same twins, limited to upright placements for those that have some; bodies are shared."""
         twins = (
-            replace(twin, poses=tuple(pose for pose in twin.poses if pose.upright)) if twin.stands else twin
+            replace(twin, poses=tuple(pose for pose in twin.poses if pose.upright)) if twin.has_upright_pose else twin
             for twin in self.twins
         )
         return Pool(twins, self._read_body, self._bodies)
@@ -174,7 +174,7 @@ def read_pool(dataset: str | Path, cache: Path | None = None) -> Pool:
 
 
 @lru_cache(maxsize=4)
-def pool_of(dataset: str, cache: str | None = None) -> Pool:
+def cached_pool(dataset: str, cache: str | None = None) -> Pool:
     """Return ``read_pool`` of a path, cached in the process: data sets are not expected to change while layouts are made."""
     return read_pool(dataset, None if cache is None else Path(cache))
 
@@ -195,7 +195,7 @@ class _Points(BaseModel):
     functional: list[LabelledPoint] = []
 
 
-class _Standing(BaseModel):
+class _RecordExcerpt(BaseModel):
     """The part of an accepted record that the pool needs: validating all of a hundred thousand records would take minutes."""
 
     twin_id: str
@@ -208,11 +208,11 @@ class _Standing(BaseModel):
 
 
 def _pool_twin(content: bytes, name: str) -> PoolTwin | None:
-    data = in_present_version(parse_json_object(content, name, TwinError, remedy=REMEDY), name)
+    data = migrate_content(parse_json_object(content, name, TwinError, remedy=REMEDY), name)
     if data.get("status") == "rejected":
         return None
     try:
-        record = _Standing.model_validate(data)
+        record = _RecordExcerpt.model_validate(data)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))[:80]
@@ -230,7 +230,7 @@ def _pool_twin(content: bytes, name: str) -> PoolTwin | None:
     )
     if not poses:
         return None
-    state = state_of(data, name)
+    state = twin_state(data, name)
     return PoolTwin(
         record.twin_id,
         state.revision,

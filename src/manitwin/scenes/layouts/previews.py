@@ -16,11 +16,11 @@ from manitwin.formats.label_picture import label_picture
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.render.false_colors import depth_picture, id_color, ids_picture
 from manitwin.render.scene_renderer import SceneFrame, SceneRenderer, ShadowRegion
-from manitwin.scenes.furniture_pictures import add_furniture, lighting_of
+from manitwin.scenes.furniture_pictures import add_furniture, render_lighting
 from manitwin.scenes.perception.scene_truth import PICTURES_FACTS
 from manitwin.scenes.perception.scene_views import intrinsics, scene_camera, scene_parts, views_and_parts
 from manitwin.scenes.scene import SceneRecord
-from manitwin.scenes.twin_looks import seen_shape, twin_looks
+from manitwin.scenes.twin_surfaces import raycast_shape, twin_drawable
 
 WEBP_QUALITY = 90
 DEPTH_UNIT_M = 0.001
@@ -38,10 +38,10 @@ def scene_pictures(
     if not record.cameras:
         raise UsageError(f"scene {record.scene_id}: no cameras in its record; sample it again")
     shadows = ShadowRegion().for_pictures_of(max(width_px, height_px))
-    with SceneRenderer(lighting_of(record.ambient, record.lights), shadows=shadows) as renderer:
+    with SceneRenderer(render_lighting(record.ambient, record.lights), shadows=shadows) as renderer:
         for thing in record.objects:
             pose = transform(rotation_from_quaternion_wxyz(np.array(thing.quaternion_wxyz)), np.array(thing.position_m))
-            renderer.add(thing.name, twin_looks(twin_folder(thing.twin_id), max(width_px, height_px)), pose)
+            renderer.add(thing.name, twin_drawable(twin_folder(thing.twin_id), max(width_px, height_px)), pose)
         add_furniture(renderer, record.furniture, seed=zlib.crc32(record.scene_id.encode()))
         cameras = [scene_camera(each, width_px, height_px) for each in record.cameras]
         frames = renderer.render(cameras, geometry=True)
@@ -66,7 +66,7 @@ def write_previews(
     folder.mkdir(parents=True, exist_ok=True)
     facts: dict[str, object] = {"scene_id": record.scene_id, "depth_unit_m": DEPTH_UNIT_M, "ids": ids}
     facts["colors_rgb"] = {name: id_color(number) for name, number in ids.items()}
-    shapes = {each: seen_shape(twin_folder(each)) for each in sorted({thing.twin_id for thing in record.objects})}
+    shapes = {each: raycast_shape(twin_folder(each)) for each in sorted({thing.twin_id for thing in record.objects})}
     parts = scene_parts(record, shapes)
     facts["parts"] = {str(number): part.to_json() for number, part in enumerate(parts, 1)}
     cameras: dict[str, object] = {}

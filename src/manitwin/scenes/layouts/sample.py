@@ -11,12 +11,18 @@ import numpy as np
 
 from manitwin.errors import Rejected, UsageError
 from manitwin.geometry.poses import quaternion_wxyz, transform_points
-from manitwin.scenes.layouts.judging import Judgement, judge
-from manitwin.scenes.layouts.placing import Obstacles, Patch, clutter_of, put_on_surface, workspace_of
+from manitwin.scenes.layouts.layout_validation import LayoutValidation, validate_layout
+from manitwin.scenes.layouts.placing import Obstacles, Patch, clutter_of, place_on_surface, workspace_of
 from manitwin.scenes.layouts.pool import Pool, PoolBody, PoolTwin, StandingPose
-from manitwin.scenes.layouts.slot_drawing import draw_slots
-from manitwin.scenes.layouts.slots import Put, Slot, draw_twin
-from manitwin.scenes.layouts.stacking import level_poses, mouth_of, open_poses, put_into, put_onto
+from manitwin.scenes.layouts.slot_sampling import sample_slots
+from manitwin.scenes.layouts.slots import Slot, SupportedPose, sample_twin
+from manitwin.scenes.layouts.stacking import (
+    container_opening,
+    level_poses,
+    open_poses,
+    place_in_container,
+    place_on_object,
+)
 from manitwin.scenes.layouts.surroundings import make_cameras, make_furniture, make_lights
 from manitwin.scenes.loaded_scene import furniture_boxes
 from manitwin.scenes.scene import SCENE_SCHEMA_VERSION, Furniture, SceneObject, SceneRecord
@@ -44,9 +50,9 @@ def sample_layout(pool: Pool, settings: LayoutSettings, seed: int, number: int) 
     pool = pool.upright if settings.upright else pool
     furniture = make_furniture(settings.surface, rng)
     ambient, lights = make_lights(rng)
-    making = _Making(pool, settings, furniture, rng)
+    making = _LayoutSampler(pool, settings, furniture, rng)
     making.place(making.slots)
-    judgement, repairs = making.judged(), 0
+    judgement, repairs = making.validate(), 0
     while judgement.wrong:
         repairs += len(judgement.wrong)
         if repairs > settings.repairs:
@@ -57,7 +63,7 @@ def sample_layout(pool: Pool, settings: LayoutSettings, seed: int, number: int) 
                 LAYOUT,
             )
         making.repair(judgement.wrong)
-        judgement = making.judged()
+        judgement = making.validate()
     assert judgement.measures is not None
     return SceneRecord(
         schema_version=SCENE_SCHEMA_VERSION,
@@ -78,7 +84,7 @@ def sample_layout(pool: Pool, settings: LayoutSettings, seed: int, number: int) 
     )
 
 
-class _Making:
+class _LayoutSampler:
     """A layout during sampling."""
 
     def __init__(self, pool: Pool, settings: LayoutSettings, furniture: Furniture, rng: np.random.Generator):
@@ -86,7 +92,7 @@ class _Making:
         self.boxes = furniture_boxes(furniture)
         self.level = clutter_of(settings)
         self.crowded, self.spare_carriers = False, CARRIERS_TRIED
-        self.slots = draw_slots(pool, settings, rng)
+        self.slots = sample_slots(pool, settings, rng)
         workspace = workspace_of(settings)
         standing = [slot for slot in self.slots if slot.role == "stand"]
         areas = np.array([np.prod(support.half_extents_m) for support in furniture.supports])
@@ -99,8 +105,8 @@ class _Making:
                 raise UsageError(f"the {support.name} lies outside the workspace; give another workspace or surface")
             self.patches |= {slot.number: patch for slot in mine}
 
-    def judged(self) -> Judgement:
-        return judge(self.pool, self.slots, self.boxes, self.settings)
+    def validate(self) -> LayoutValidation:
+        return validate_layout(self.pool, self.slots, self.boxes, self.settings)
 
     def place(self, slots: list[Slot]) -> None:
         """Place the objects of slots, large ones and bases first; one without room is left out.
@@ -113,7 +119,7 @@ class _Making:
         for slot in [*first, *(s for s in slots if s.role != "stand")]:
             if slot not in self.slots:
                 continue
-            slot.put = self._stand(slot) if slot.role == "stand" else self._set_on_or_in(slot)
+            slot.put = self._place_standing(slot) if slot.role == "stand" else self._place_on_or_in(slot)
             if slot.put is None and slot.parent is not None and self.spare_carriers:
                 self.spare_carriers -= 1
                 self._another_twin(slot.parent, frozenset())
@@ -140,7 +146,7 @@ class _Making:
 
     def _another_twin(self, slot: Slot, tried: frozenset[str]) -> None:
         but = tried | ({slot.twin.twin_id} if slot.twin is not None else frozenset())
-        slot.twin, slot.failures = draw_twin(self.pool, slot, self.slots, self.rng, but), 0
+        slot.twin, slot.failures = sample_twin(self.pool, slot, self.slots, self.rng, but), 0
 
     def _leave_out(self, slot: Slot) -> None:
         if slot.needed or len(self.slots) <= self.settings.objects[0]:
@@ -154,7 +160,7 @@ class _Making:
         self.slots.remove(slot)
         self.crowded = True
 
-    def _stand(self, slot: Slot) -> Put | None:
+    def _place_standing(self, slot: Slot) -> SupportedPose | None:
         others = [each.put.parts for each in self.slots if each is not slot and each.put is not None]
         obstacles = Obstacles(self.boxes, others)
         tried: frozenset[str] = frozenset()
@@ -165,7 +171,7 @@ class _Making:
             poses = _poses(slot, slot.twin, body)
             put = None
             if poses:
-                put = put_on_surface(
+                put = place_on_surface(
                     body, poses, self.patches[slot.number], obstacles, gap_m=self.level.min_gap_m,
                     tries=max(1, self.settings.poses_tried // PLACES_A_TWIN), rng=self.rng,
                 )  # fmt: skip
@@ -175,7 +181,7 @@ class _Making:
             self._another_twin(slot, tried)
         return None
 
-    def _set_on_or_in(self, slot: Slot) -> Put | None:
+    def _place_on_or_in(self, slot: Slot) -> SupportedPose | None:
         parent = slot.parent
         assert parent is not None and parent.twin is not None
         if parent.put is None:
@@ -183,14 +189,16 @@ class _Making:
         placed = [each.put.parts for each in self.slots if each is not slot and each.put is not None]
         obstacles = Obstacles(self.boxes, placed).above(-np.inf)
         base, surface = parent.put.parts, parent.put.surface
-        mouth = mouth_of(self.pool.body(parent.twin.twin_id), base.pose) if slot.role == "in" else None
+        mouth = container_opening(self.pool.body(parent.twin.twin_id), base.pose) if slot.role == "in" else None
         for _ in range(self.settings.poses_tried):
-            slot.twin = draw_twin(self.pool, slot, self.slots, self.rng)
+            slot.twin = sample_twin(self.pool, slot, self.slots, self.rng)
             body = self.pool.body(slot.twin.twin_id)
             if slot.role == "on":
-                put = put_onto(slot.twin, body, surface, base, obstacles, self.rng)
+                put = place_on_object(slot.twin, body, surface, base, obstacles, self.rng)
             else:
-                put = None if mouth is None else put_into(slot.twin, body, surface, mouth, obstacles, self.rng)
+                put = (
+                    None if mouth is None else place_in_container(slot.twin, body, surface, mouth, obstacles, self.rng)
+                )
             if put is not None:
                 return put
         return None
@@ -203,7 +211,7 @@ def _poses(slot: Slot, twin: PoolTwin, body: PoolBody) -> Sequence[StandingPose]
     return level_poses(twin, body) if slot.base else twin.poses
 
 
-def _extent(pool: Pool, slots: list[Slot], judgement: Judgement) -> tuple[np.ndarray, np.ndarray]:
+def _extent(pool: Pool, slots: list[Slot], judgement: LayoutValidation) -> tuple[np.ndarray, np.ndarray]:
     """Return the lower and upper corner ``(3,)`` of the bounding box of all objects in the world."""
     points = np.concatenate(
         [
@@ -222,7 +230,7 @@ def _radius(slot: Slot) -> float:
     return float(np.average([pose.collision_radius_m for pose in slot.twin.poses], weights=weights))
 
 
-def _objects(slots: list[Slot], judgement: Judgement) -> tuple[SceneObject, ...]:
+def _objects(slots: list[Slot], judgement: LayoutValidation) -> tuple[SceneObject, ...]:
     names = {slot.number: f"object_{i:02d}" for i, slot in enumerate(slots)}
     found = []
     for slot, pose in zip(slots, judgement.object_to_world, strict=True):

@@ -15,7 +15,7 @@ Role = Literal["stand", "on", "in"]
 
 
 @dataclass(frozen=True)
-class Put:
+class SupportedPose:
     """An object's position: the support's name, its placement, and its parts at its pose."""
 
     surface: str
@@ -43,7 +43,7 @@ class Slot:
     vessel: bool = False
     base: bool = False
     twin: PoolTwin | None = None
-    put: Put | None = None
+    put: SupportedPose | None = None
     failures: int = 0
 
     @property
@@ -62,7 +62,7 @@ class Slot:
         return self.parent is other or other.parent is self or same
 
 
-def draw_twin(
+def sample_twin(
     pool: Pool, slot: Slot, slots: list[Slot], rng: np.random.Generator, but: frozenset[str] = frozenset()
 ) -> PoolTwin:
     """Draw a twin for a slot, of its category; one already in the layout only if no other is suitable.

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.geometry.hull_distance import PlacedParts, distance
 from manitwin.geometry.poses import rotation_between, transform, transform_points
-from manitwin.scenes.layouts.placing import draw_pose, on_plane
+from manitwin.scenes.layouts.placing import pose_on_plane, sample_pose
 from manitwin.scenes.layouts.pool import PoolBody, PoolTwin, StandingPose
-from manitwin.scenes.layouts.slots import Put
+from manitwin.scenes.layouts.slots import SupportedPose
 
 ABOVE_M = 0.0005  # gap at which lowering stops, so that the object falls only a little
 LOWERING_STEPS = 12
@@ -28,7 +28,7 @@ RIM_SLACK = 0.95  # share of the rim's radius that an inserted object may take
 
 
 @dataclass(frozen=True)
-class Mouth:
+class ContainerOpening:
     """A container's opening in the world: the centre of its rim, the rim's radius, and the depth below."""
 
     center_m: np.ndarray
@@ -36,18 +36,18 @@ class Mouth:
     depth_m: float
 
 
-def mouth_of(body: PoolBody, object_to_world: np.ndarray) -> Mouth | None:
+def container_opening(body: PoolBody, object_to_world: np.ndarray) -> ContainerOpening | None:
     """Return a container's mouth if it opens upward, else None."""
     opening = body.opening
     if opening is None or float((object_to_world[:3, :3] @ opening.axis)[2]) < UP_RIGHT:
         return None
     center = transform_points(object_to_world, opening.center_m[None])[0]
-    return Mouth(center, opening.rim_radius_m, opening.depth_m)
+    return ContainerOpening(center, opening.rim_radius_m, opening.depth_m)
 
 
 def open_poses(twin: PoolTwin, body: PoolBody) -> list[StandingPose]:
     """Return the placements in which a container opens upward."""
-    return [pose for pose in twin.poses if mouth_of(body, pose.object_to_plane) is not None]
+    return [pose for pose in twin.poses if container_opening(body, pose.object_to_plane) is not None]
 
 
 def level_poses(twin: PoolTwin, body: PoolBody) -> list[StandingPose]:
@@ -57,21 +57,22 @@ def level_poses(twin: PoolTwin, body: PoolBody) -> list[StandingPose]:
     return [pose for pose in twin.poses if _is_broad(level_end(body.parts.at(pose.object_to_plane), top=True))]
 
 
-def _is_broad(level: Level | None) -> bool:
+def _is_broad(level: LevelFace | None) -> bool:
     return level is not None and level.depth_inside(level.middle_m) >= BROAD_M
 
 
-def put_into(
+def place_in_container(
     twin: PoolTwin,
     body: PoolBody,
     surface: str,
-    mouth: Mouth,
+    mouth: ContainerOpening,
     obstacles: Sequence[PlacedParts],
     rng: np.random.Generator,
-) -> Put | None:
+) -> SupportedPose | None:
     """Return a twin lowered into a container, in one of its placements or on end; None if it is wider than the rim."""
     rotation = _turned(
-        draw_pose(twin.poses, rng).object_to_plane[:3, :3] if rng.random() < 0.5 else _on_end(body, rng), rng
+        sample_pose(twin.poses, rng).object_to_plane[:3, :3] if rng.random() < 0.5 else _upended_rotation(body, rng),
+        rng,
     )
     points = body.parts.whole @ rotation.T
     middle = (points[:, :2].min(0) + points[:, :2].max(0)) / 2
@@ -81,29 +82,29 @@ def put_into(
     around, out = rng.uniform(-np.pi, np.pi), spare * np.sqrt(rng.random())
     shift = mouth.center_m[:2] - middle + out * np.array([np.cos(around), np.sin(around)])
     start = mouth.center_m[2] + 0.02 - points[:, 2].min()
-    lowered = lower(
+    lowered = lower_to_contact(
         body, transform(rotation, np.array([*shift, start])), obstacles, mouth.center_m[2] - 2 * mouth.depth_m
     )
     if lowered is None or lowered.bounds[0][2] > mouth.center_m[2] - mouth.depth_m / 4:
         return None
-    return Put(surface, None, lowered)
+    return SupportedPose(surface, None, lowered)
 
 
-def put_onto(
+def place_on_object(
     twin: PoolTwin,
     body: PoolBody,
     surface: str,
     base: PlacedParts,
     obstacles: Sequence[PlacedParts],
     rng: np.random.Generator,
-) -> Put | None:
+) -> SupportedPose | None:
     """Return a twin in one of its placements on the level top of another, or None if it would not stand there.
 
     Its centre of mass is above the top and above its own foot, by ``STANDS_M`` inside both, hence above their intersection.
     """
-    pose = draw_pose(twin.poses, rng)
+    pose = sample_pose(twin.poses, rng)
     top = level_end(base, top=True)
-    turned = body.parts.at(on_plane(pose, np.zeros(2), 0.0, rng.uniform(-np.pi, np.pi)))
+    turned = body.parts.at(pose_on_plane(pose, np.zeros(2), 0.0, rng.uniform(-np.pi, np.pi)))
     foot = level_end(turned, top=False)
     center = transform_points(turned.pose, body.body.center_of_mass_m[None])[0, :2]
     if top is None or foot is None or foot.depth_inside(center) < STANDS_M:
@@ -111,13 +112,15 @@ def put_onto(
     target = top.middle_m + (top.depth_inside(top.middle_m) - STANDS_M) * rng.uniform(-0.7, 0.7, 2)
     top_m = float(base.bounds[1][2])
     raised = transform(translation=np.array([*(target - center), top_m + 0.02])) @ turned.pose
-    lowered = lower(body, raised, obstacles, top_m - FLAT_M)
+    lowered = lower_to_contact(body, raised, obstacles, top_m - FLAT_M)
     if lowered is None or lowered.bounds[0][2] < top_m - FLAT_M:
         return None
-    return Put(surface, pose.placement, lowered)
+    return SupportedPose(surface, pose.placement, lowered)
 
 
-def lower(body: PoolBody, raised: np.ndarray, obstacles: Sequence[PlacedParts], floor_m: float) -> PlacedParts | None:
+def lower_to_contact(
+    body: PoolBody, raised: np.ndarray, obstacles: Sequence[PlacedParts], floor_m: float
+) -> PlacedParts | None:
     """Lower a body until it is close to an obstacle; None if it starts in contact or sinks below ``floor_m`` freely.
 
     Conservative advancement: a body may sink by its distance to the nearest obstacle without contact. The distance left after
@@ -141,7 +144,7 @@ def lower(body: PoolBody, raised: np.ndarray, obstacles: Sequence[PlacedParts], 
 
 
 @dataclass(frozen=True)
-class Level:
+class LevelFace:
     """The level end of a body as a convex polygon from above: its middle, and sides ``normals . x + offsets <= 0``."""
 
     middle_m: np.ndarray
@@ -153,7 +156,7 @@ class Level:
         return -float((self.normals @ point + self.offsets_m).max())
 
 
-def level_end(parts: PlacedParts, *, top: bool, within_m: float = LEVEL_M) -> Level | None:
+def level_end(parts: PlacedParts, *, top: bool, within_m: float = LEVEL_M) -> LevelFace | None:
     """Return a body's upper or lower end if it is level (within ``within_m``) and ``2 * STANDS_M`` wide about its middle."""
     heights = parts.whole[:, 2] * (1 if top else -1)
     points = parts.whole[heights > heights.max() - within_m][:, :2]
@@ -161,11 +164,11 @@ def level_end(parts: PlacedParts, *, top: bool, within_m: float = LEVEL_M) -> Le
         return None
     polygon = ConvexHull(points)
     middle = points[polygon.vertices].mean(0)
-    level = Level(middle, polygon.equations[:, :2], polygon.equations[:, 2])
+    level = LevelFace(middle, polygon.equations[:, :2], polygon.equations[:, 2])
     return level if level.depth_inside(middle) >= 2 * STANDS_M else None
 
 
-def _on_end(body: PoolBody, rng: np.random.Generator) -> np.ndarray:
+def _upended_rotation(body: PoolBody, rng: np.random.Generator) -> np.ndarray:
     """Return a rotation that puts the body's longest axis upright, either end up, with a small tilt."""
     spread = np.linalg.eigh(np.cov(body.parts.whole.T))[1]
     longest = spread[:, 2] * (1 if rng.random() < 0.5 else -1)

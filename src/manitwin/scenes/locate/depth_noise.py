@@ -31,7 +31,7 @@ class DepthNoise:
         """Return the standard deviation at each depth."""
         return np.asarray(self.base_m + self.growth_per_m * np.maximum(depth_m - self.nearest_m, 0.0) ** 2)
 
-    def observed(self, depth_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    def simulate_depth(self, depth_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Return true depths ``(H, W)`` (0: nothing) as the camera measures them: multiples of ``step_m``, 0 unknown."""
         height, width = depth_m.shape
         rows, columns = np.mgrid[:height, :width]

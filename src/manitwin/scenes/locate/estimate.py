@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 
 from manitwin.geometry.poses import transform_points
-from manitwin.scenes.locate.comparison import Evidence, drawn_depth_m
 from manitwin.scenes.locate.depth_view import LEAST_PX, DepthView, known_depth
 from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.scenes.locate.pose_scoring import PixelSamples, rendered_depth_m
 from manitwin.scenes.locate.search import Candidates, find_candidates
 
 LEAST_SCORE = 0.8
@@ -110,15 +110,15 @@ def pose_distances_m(model: PoseModel, poses: np.ndarray, other: np.ndarray) -> 
         return np.asarray(np.linalg.norm(moved[:, :3, :3] @ model.symmetries.center_m + moved[:, :3, 3], axis=1))
     points = model.points[:: max(1, len(model.points) // _POINTS)]
     there = transform_points(other, points)
-    same = model.same_poses
+    same = model.symmetry_poses
     moved = np.einsum("sij,nj->sni", same[:, :3, :3], points) + same[:, None, :3, 3]
     seen = np.einsum("kij,snj->ksni", poses[:, :3, :3], moved) + poses[:, None, None, :3, 3]
     return np.asarray(np.linalg.norm(seen - there, axis=3).mean(2).min(1))
 
 
-def visible_shares(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float) -> np.ndarray:
+def visible_shares(model: PoseModel, poses: np.ndarray, evidence: PixelSamples, tolerance_m: float) -> np.ndarray:
     """Return the visible share of each rendered pose, ``(K,)``; the rest is hidden by something nearer."""
-    drawn, _ = drawn_depth_m(model, poses, evidence)
+    drawn, _ = rendered_depth_m(model, poses, evidence)
     hit = np.isfinite(drawn)
     seen = hit & (drawn < evidence.depth_m + tolerance_m)
     shown = (hit * evidence.weight).sum(1)

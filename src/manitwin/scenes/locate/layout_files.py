@@ -52,9 +52,9 @@ def layout_document(scene: LocatedScene | NoLayout) -> dict[str, Any]:
         return {"scene": None, "reason": scene.reason, "objects": [], **nothing}
     record, world = scene.record, scene.world
     objects = [
-        _told(each, moved_m, turned_rad, None)
+        _object_document(each, moved_m, turned_rad, None)
         for each, (moved_m, turned_rad) in zip(scene.objects, scene.motions, strict=True)
-    ] + [_told(each, None, None, why) for each, why in scene.as_boxes]
+    ] + [_object_document(each, None, None, why) for each, why in scene.as_boxes]
     return {
         "scene": None if record is None else f"{scene_name(record.scene_id)}/{SCENE}",
         "reason": "nothing stays where it was found" if record is None else "",
@@ -67,7 +67,9 @@ def layout_document(scene: LocatedScene | NoLayout) -> dict[str, Any]:
     }
 
 
-def _told(each: LocatedObject, moved_m: float | None, turned_rad: float | None, as_boxes: str | None) -> dict[str, Any]:
+def _object_document(
+    each: LocatedObject, moved_m: float | None, turned_rad: float | None, as_boxes: str | None
+) -> dict[str, Any]:
     return {
         "name": each.placed.name,
         "twin_id": each.placed.twin_id,

@@ -13,8 +13,8 @@ from manitwin.geometry.rigid_body import StaticBox
 from manitwin.scenes.layouts.surroundings import TABLE_M
 from manitwin.scenes.locate.depth_view import DepthView, measured_noise_m
 from manitwin.scenes.locate.located_objects import LocatedObject
-from manitwin.scenes.locate.seen_obstacles import SeenBox, seen_boxes
-from manitwin.scenes.locate.world_frame import WorldFrame, seen_rectangle, table_points
+from manitwin.scenes.locate.visible_obstacles import ObstacleBox, obstacle_boxes
+from manitwin.scenes.locate.world_frame import WorldFrame, table_points, visible_rectangle
 from manitwin.scenes.scene import Furniture, SupportRegion, SurfaceBox
 
 _EDGE_M = 0.01
@@ -26,7 +26,7 @@ def located_furniture(view: DepthView, objects: Sequence[LocatedObject], world: 
     noise_m = measured_noise_m(view, np.ones(view.depth_m.shape, bool))
     located = np.any([each.thing.mask for each in objects], axis=0)
     surfaces = np.concatenate([each.surface for each in objects])
-    low, high = seen_rectangle(
+    low, high = visible_rectangle(
         table_points(view, world, noise_m), np.concatenate([footprint(each.corners) for each in objects])
     )
     (x, y), (half_x, half_y) = (low + high) / 2, (high - low) / 2 + _EDGE_M
@@ -40,13 +40,13 @@ def located_furniture(view: DepthView, objects: Sequence[LocatedObject], world: 
         name="table", center_m=top.center_m[:2], half_extents_m=top.half_extents_m[:2], height_m=round(world.table_m, 6)
     )
     own = [each.parts_at(each.placed.object_to_world) for each in objects]
-    boxes = [_box(number, each) for number, each in enumerate(seen_boxes(view, located, world, surfaces, noise_m))]
+    boxes = [_box(number, each) for number, each in enumerate(obstacle_boxes(view, located, world, surfaces, noise_m))]
     free = [box for box in boxes if not any(overlap_depth(parts, _parts_of(box)) > 0 for parts in own)]
     furniture = Furniture(kind="table", support_height_m=support.height_m, boxes=(top, *free), supports=(support,))
     return furniture, len(boxes) - len(free)
 
 
-def _box(number: int, seen: SeenBox) -> SurfaceBox:
+def _box(number: int, seen: ObstacleBox) -> SurfaceBox:
     half = np.maximum((seen.high_m - seen.low_m) / 2, _LEAST_HALF_M)
     center = triple((seen.high_m + seen.low_m) / 2)
     return SurfaceBox(name=f"seen_{number:02d}", center_m=center, half_extents_m=triple(half), material="cloth")

@@ -11,7 +11,7 @@ import numpy as np
 from manitwin.geometry.hull_distance import ConvexParts, PlacedParts
 from manitwin.geometry.poses import rotation_between, rotation_from_quaternion_wxyz, transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
-from manitwin.scenes.locate.recognition import Thing
+from manitwin.scenes.locate.recognition import ViewedObject
 from manitwin.scenes.locate.world_frame import WorldFrame
 from manitwin.twin.loaded_twin import Twin
 
@@ -31,7 +31,7 @@ class LocatedObject:
     seen: np.ndarray
     placement: int | None
     twin: Twin
-    thing: Thing
+    thing: ViewedObject
 
     @property
     def corners(self) -> np.ndarray:
@@ -54,7 +54,7 @@ class LocatedObject:
         return self.parts.at(object_to_world)
 
 
-def located_objects(things: Sequence[tuple[Thing, Twin]], world: WorldFrame) -> tuple[LocatedObject, ...]:
+def located_objects(things: Sequence[tuple[ViewedObject, Twin]], world: WorldFrame) -> tuple[LocatedObject, ...]:
     """Return the located objects in the world, each in its best pose; objects without a pose are left out."""
     found: list[LocatedObject] = []
     for thing, twin in things:

@@ -15,7 +15,7 @@ from manitwin.scenes.loaded_scene import furniture_boxes
 from manitwin.scenes.locate.depth_view import DepthView
 from manitwin.scenes.locate.located_furniture import located_furniture, triple
 from manitwin.scenes.locate.located_objects import LocatedObject, located_objects
-from manitwin.scenes.locate.recognition import Thing
+from manitwin.scenes.locate.recognition import ViewedObject
 from manitwin.scenes.locate.world_frame import WorldFrame
 from manitwin.scenes.scene import SCENE_SCHEMA_VERSION, Furniture, SceneMeasures, SceneObject, SceneRecord
 from manitwin.scenes.settings import LayoutSettings
@@ -48,7 +48,7 @@ class LocatedScene:
         """Displacement of each object from where it was found: of its centre of mass, m, and its rotation, rad."""
         return [_motion(each, each.seen, end) for each, end in zip(self.objects, self.rest, strict=True)]
 
-    def place_of(self, thing: Thing) -> int | None:
+    def place_of(self, thing: ViewedObject) -> int | None:
         """Return the index of a located object; None if it is not in the layout."""
         return next((number for number, each in enumerate(self.objects) if each.thing is thing), None)
 
@@ -59,7 +59,7 @@ def scene_id_of(seed: int) -> str:
 
 
 def located_scene(
-    view: DepthView, things: Sequence[tuple[Thing, Twin]], world: WorldFrame, robot: str | None, seed: int
+    view: DepthView, things: Sequence[tuple[ViewedObject, Twin]], world: WorldFrame, robot: str | None, seed: int
 ) -> LocatedScene:
     """Return the layout of the objects found in a view, at least one of which has a pose.
 
@@ -77,7 +77,7 @@ def located_scene(
             seconds=settings.settle_s,
             give_up_m=[GIVE_UP * settings.max_moved_m] * len(objects),
         )
-        reasons = [_leaves_its_place(place, each, settled, settings) for place, each in enumerate(objects)]
+        reasons = [_motion_defect(place, each, settled, settings) for place, each in enumerate(objects)]
         if not any(reasons):
             record = _record(objects, settled, furniture, robot, seed)
             return LocatedScene(record, world, furniture, objects, settled.object_to_world, left_out, tuple(as_boxes))
@@ -91,7 +91,7 @@ def located_scene(
     return LocatedScene(None, world, None, (), np.zeros((0, 4, 4)), 0, tuple(as_boxes))
 
 
-def _leaves_its_place(place: int, each: LocatedObject, settled: SettledScene, settings: LayoutSettings) -> str:
+def _motion_defect(place: int, each: LocatedObject, settled: SettledScene, settings: LayoutSettings) -> str:
     """Return why an object does not stay after its release; empty if it stays."""
     moved_m, turned_rad = _motion(each, each.placed.object_to_world, settled.object_to_world[place])
     when = "when it is let go where it was found"
@@ -106,7 +106,7 @@ def _record(
     objects: Sequence[LocatedObject], settled: SettledScene, furniture: Furniture, robot: str | None, seed: int
 ) -> SceneRecord:
     rested = list(zip(objects, settled.object_to_world, strict=True))
-    bearers = [_bearer(place, objects, settled) for place in range(len(objects))]
+    bearers = [_supporting_object(place, objects, settled) for place in range(len(objects))]
     names, parts = [each.placed.name for each in objects], [each.parts_at(end) for each, end in rested]
     gap_m = least_distance(
         [
@@ -141,7 +141,7 @@ def _record(
     )
 
 
-def _bearer(place: int, objects: Sequence[LocatedObject], settled: SettledScene) -> str | None:
+def _supporting_object(place: int, objects: Sequence[LocatedObject], settled: SettledScene) -> str | None:
     """Return the located object that supports an object; None for the table or an unknown obstacle."""
     own = objects[place].placed.name
     touched = settled.neighbours(own)

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 
 from manitwin.geometry.poses import transform_points
-from manitwin.scenes.locate.comparison import Evidence, drawn_depth_m
 from manitwin.scenes.locate.depth_view import DepthView, known_depth
 from manitwin.scenes.locate.estimate import PoseEstimate
 from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.scenes.locate.pose_scoring import PixelSamples, rendered_depth_m
 
 PANEL_PX = 480
 COLORS = ((40, 200, 80), (255, 150, 30), (200, 80, 220), (60, 170, 255))
@@ -68,8 +68,8 @@ def _drawn(view: DepthView, model: PoseModel, pose: np.ndarray, tolerance_m: flo
     rays = view.rays(pixels)
     stretch = np.linalg.norm(rays, axis=1)
     seen_m = view.depth_m.ravel()[pixels]
-    evidence = Evidence(rays / stretch[:, None], stretch, seen_m, np.ones(len(pixels)), 0, pixels)
-    depth = drawn_depth_m(model, pose[None], evidence)[0][0]
+    evidence = PixelSamples(rays / stretch[:, None], stretch, seen_m, np.ones(len(pixels)), 0, pixels)
+    depth = rendered_depth_m(model, pose[None], evidence)[0][0]
     hit, seen = np.zeros(height * width, bool), np.zeros(height * width, bool)
     hit[pixels] = np.isfinite(depth)
     seen[pixels] = np.isfinite(depth) & ((depth < seen_m + tolerance_m) | (seen_m == 0))

@@ -14,7 +14,7 @@ from manitwin.geometry.poses import transform
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
 from manitwin.geometry.symmetry import Symmetries, find_symmetries
-from manitwin.render.raycast import merged
+from manitwin.render.raycast import merge_parts
 from manitwin.scenes.locate.registration import Surface, align
 from manitwin.twin.loaded_twin import Twin
 
@@ -51,7 +51,7 @@ class PoseModel:
     @classmethod
     def of_twin(cls, twin: Twin) -> PoseModel:
         """Prepare a twin; raises TwinError."""
-        return cls.of_mesh(twin.record.twin_id, merged(twin.visual))
+        return cls.of_mesh(twin.record.twin_id, merge_parts(twin.visual))
 
     @classmethod
     def of_mesh(cls, twin_id: str, mesh: trimesh.Trimesh) -> PoseModel:
@@ -106,7 +106,7 @@ class PoseModel:
         return self.surface.points
 
     @cached_property
-    def same_poses(self) -> np.ndarray:
+    def symmetry_poses(self) -> np.ndarray:
         """The rotational symmetries ``(S, 4, 4)`` of the shape in the object frame, identity first.
 
         For a body of revolution, they are discretized rotations about its axis, also combined with a rotation that swaps its

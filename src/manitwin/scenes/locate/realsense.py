@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from manitwin.errors import Unavailable, UsageError
-from manitwin.scenes.locate.captured import Capture
+from manitwin.scenes.locate.capture_folder import Capture
 
 WIDTH_PX, HEIGHT_PX, RATE_HZ = 640, 480, 30
 FRAMES = 15
@@ -34,7 +34,7 @@ def sdk() -> Any:
         ) from error
 
 
-def record(rs: Any, *, bag: Path | None = None, serial: str | None = None, frames: int = FRAMES) -> Capture:
+def capture_view(rs: Any, *, bag: Path | None = None, serial: str | None = None, frames: int = FRAMES) -> Capture:
     """Return the current view of a camera, or the start of a recorded ``bag``, with depths aligned to the colours.
 
     ``rs`` is the module; ``serial`` selects one of several cameras. Raises Unavailable if there is no camera, no frame arrives

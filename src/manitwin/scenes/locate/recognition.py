@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.dataset.index.query import Index
-from manitwin.dataset.search.search import likeness
-from manitwin.dataset.search.twin_looks import twin_looks
+from manitwin.dataset.search.appearance_vectors import load_appearance_vectors
+from manitwin.dataset.search.search import view_similarity
 from manitwin.errors import UsageError
-from manitwin.models.embedders.looks import look_of
+from manitwin.models.embedders.appearance import appearance_descriptor
 from manitwin.scenes.locate.depth_view import DepthView
 from manitwin.scenes.locate.estimate import Guess, Location, locate_in_view
 from manitwin.scenes.locate.pose_model import PoseModel
@@ -24,7 +24,7 @@ CANDIDATES = 5
 
 
 @dataclass(frozen=True)
-class Tried:
+class CandidateTwin:
     """A twin that was tried for an object: its similarity in appearance (None: not computed), and the score of its best pose."""
 
     twin_id: str
@@ -33,13 +33,13 @@ class Tried:
 
 
 @dataclass(frozen=True)
-class Thing:
+class ViewedObject:
     """An object in a view: its mask ``(H, W) bool``, the decision, and every twin that was tried, best first."""
 
     mask: np.ndarray
     location: Location
     model: PoseModel
-    tried: tuple[Tried, ...]
+    tried: tuple[CandidateTwin, ...]
 
 
 class DatasetTwins:
@@ -49,7 +49,7 @@ class DatasetTwins:
         """Read cached appearances and render the others; raises UsageError without an index, and for a data set at a URL."""
         rows = Index(root).select("twins", columns=["twin_id", "revision"]).to_pylist()
         self._root = root
-        self._looks = dict(twin_looks(root, {row["twin_id"]: row["revision"] for row in rows}, on_twin))
+        self._looks = dict(load_appearance_vectors(root, {row["twin_id"]: row["revision"] for row in rows}, on_twin))
         self._models: dict[str, PoseModel] = {}
         if not self._looks:
             raise UsageError(f"{root.url}: has no accepted twin; build twins, or give another data set")
@@ -69,12 +69,12 @@ class DatasetTwins:
         """Return the twins with their similarity to what ``mask`` shows, most similar first."""
         rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
         cut = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        look = look_of(rgb[cut], mask[cut])
-        found = [(twin_id, likeness(look, views)) for twin_id, views in self._looks.items()]
+        look = appearance_descriptor(rgb[cut], mask[cut])
+        found = [(twin_id, view_similarity(look, views)) for twin_id, views in self._looks.items()]
         return sorted(found, key=lambda each: (-each[1], each[0]))
 
 
-def which_twin(
+def recognize_twin(
     view: DepthView,
     mask: np.ndarray,
     twins: DatasetTwins,
@@ -82,7 +82,7 @@ def which_twin(
     tried: int = CANDIDATES,
     seed: int = 0,
     guess: Guess | None = None,
-) -> Thing:
+) -> ViewedObject:
     """Locate the twins most similar to an object, and return the one that explains it best, or a rejection.
 
     Raises UsageError for a view without colours.
@@ -92,18 +92,18 @@ def which_twin(
     answers = []
     for twin_id, alike in twins.ranked(view.rgb, mask)[:tried]:
         location = locate_in_view(view, mask, twins.model(twin_id), seed=seed, guess=guess)
-        answers.append((location, Tried(twin_id, alike, location.best_score)))
+        answers.append((location, CandidateTwin(twin_id, alike, location.best_score)))
     answers.sort(key=lambda each: -each[0].best_score)
     best = answers[0][0]
-    return Thing(mask, best, twins.model(best.twin_id), tuple(each for _, each in answers))
+    return ViewedObject(mask, best, twins.model(best.twin_id), tuple(each for _, each in answers))
 
 
-def where_is(
+def find_twin_in_masks(
     view: DepthView, masks: Sequence[np.ndarray], model: PoseModel, *, seed: int = 0, guess: Guess | None = None
-) -> Thing:
+) -> ViewedObject:
     """Locate a twin in each of several masks, and return the mask that it explains best, or a rejection."""
     if not masks:
         raise UsageError(NO_MASK)
     answers = [(locate_in_view(view, mask, model, seed=seed, guess=guess), mask) for mask in masks]
     best, mask = max(answers, key=lambda each: each[0].best_score)
-    return Thing(mask, best, model, (Tried(model.twin_id, None, best.best_score),))
+    return ViewedObject(mask, best, model, (CandidateTwin(model.twin_id, None, best.best_score),))

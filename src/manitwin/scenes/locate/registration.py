@@ -49,11 +49,11 @@ def align(
         weight = (distance <= limit[:, None]).astype(float)
         if facing:  # visible surfaces face the camera, while the inside of a thin wall is as close as its outside
             weight *= ((back[:, None, :3, 3] - points) * normals).sum(2) > 0
-        poses = stepped(poses, points, surface.points[nearest], normals, weight, surface.diameter_m)
+        poses = point_to_plane_step(poses, points, surface.points[nearest], normals, weight, surface.diameter_m)
     return poses
 
 
-def stepped(
+def point_to_plane_step(
     poses: np.ndarray,
     observed: np.ndarray,
     surface: np.ndarray,

@@ -11,15 +11,15 @@ import numpy as np
 from manitwin.formats.image_file import png_of
 from manitwin.formats.output_folder import new_folder
 from manitwin.geometry.poses import quaternion_wxyz
-from manitwin.scenes.locate.carried_frames import CarriedFrame, CarriedPlacement, carry_frames
-from manitwin.scenes.locate.carried_grasps import CarriedGrasps
 from manitwin.scenes.locate.depth_view import DepthView
 from manitwin.scenes.locate.estimate import AMBIGUOUS_MARGIN, LEAST_SCORE
 from manitwin.scenes.locate.layout_files import write_layout
 from manitwin.scenes.locate.located_scene import LocatedScene
 from manitwin.scenes.locate.overlay import overlay
-from manitwin.scenes.locate.recognition import Thing
+from manitwin.scenes.locate.recognition import ViewedObject
 from manitwin.scenes.locate.size_fit import SizeFit
+from manitwin.scenes.locate.transferred_frames import TransferredFrame, TransferredPlacement, transfer_frames
+from manitwin.scenes.locate.transferred_grasps import TransferredGrasps
 from manitwin.scenes.perception.object_views import box_of
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import canonical_json
@@ -29,11 +29,11 @@ LOCATION = "location.json"
 
 
 def location_document(
-    thing: Thing,
+    thing: ViewedObject,
     twin: Twin,
-    carried: CarriedGrasps | None = None,
+    carried: TransferredGrasps | None = None,
     estimator: str | None = None,
-    placements: Sequence[CarriedPlacement] = (),
+    placements: Sequence[TransferredPlacement] = (),
     size: SizeFit | None = None,
 ) -> dict[str, Any]:
     """Return a location as JSON values: the decision, its poses, its thresholds, and the usable annotations of the twin.
@@ -71,7 +71,7 @@ def location_document(
             "axis": None if symmetries.axis is None else symmetries.axis.round(6).tolist(),
         },
         "grasps": None if carried is None else _grasps(carried),
-        "functional": [_frame(each) for each in carry_frames(thing, twin, 1.0 if size is None else size.factor)],
+        "functional": [_frame(each) for each in transfer_frames(thing, twin, 1.0 if size is None else size.factor)],
         "placements": [_placement(each) for each in placements],
     }
 
@@ -92,7 +92,7 @@ def _pose(pose: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _frame(each: CarriedFrame) -> dict[str, Any]:
+def _frame(each: TransferredFrame) -> dict[str, Any]:
     return {
         "id": each.point_id,
         "label": each.label,
@@ -103,7 +103,7 @@ def _frame(each: CarriedFrame) -> dict[str, Any]:
     }
 
 
-def _placement(each: CarriedPlacement) -> dict[str, Any]:
+def _placement(each: TransferredPlacement) -> dict[str, Any]:
     return {
         "placement": each.number,
         "probability": round(each.probability, 4),
@@ -114,7 +114,7 @@ def _placement(each: CarriedPlacement) -> dict[str, Any]:
     }
 
 
-def _grasps(carried: CarriedGrasps) -> dict[str, Any]:
+def _grasps(carried: TransferredGrasps) -> dict[str, Any]:
     return {
         "gripper": carried.gripper,
         "verified": carried.verified,
@@ -138,10 +138,10 @@ def _grasps(carried: CarriedGrasps) -> dict[str, Any]:
 
 def things_document(
     dataset: str,
-    things: Sequence[tuple[Thing, Twin]],
-    carried: Sequence[CarriedGrasps | None],
+    things: Sequence[tuple[ViewedObject, Twin]],
+    carried: Sequence[TransferredGrasps | None],
     estimator: str | None = None,
-    placements: Sequence[Sequence[CarriedPlacement]] = (),
+    placements: Sequence[Sequence[TransferredPlacement]] = (),
 ) -> dict[str, Any]:
     """Return, for each object of a view, its twin in a data set, the twins tried for it, and its grasps."""
     return {
@@ -167,7 +167,7 @@ def write_location(
     out: Path,
     document: dict[str, Any],
     view: DepthView,
-    things: Sequence[Thing],
+    things: Sequence[ViewedObject],
     layout: tuple[LocatedScene, str] | None = None,
 ) -> None:
     """Write ``location.json``, an ``overlay_<n>.png`` for each object, and the layout into a new folder, atomically.

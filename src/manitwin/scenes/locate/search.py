@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from manitwin.scenes.locate.comparison import Evidence, explained, pixel_gains, polished, scores_of
 from manitwin.scenes.locate.depth_view import DepthView, known_depth, measured_noise_m
 from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.scenes.locate.pose_scoring import PixelSamples, pixel_gains, refine_poses, score_poses, scores_of
 from manitwin.scenes.locate.registration import align
-from manitwin.scenes.locate.starts import hidden_direction, starts
+from manitwin.scenes.locate.start_poses import find_start_poses, hidden_direction
 
 FOLLOWED, REFINED, TURNED, AROUND, POLISHED = 20, 8, 12, 16, 10
 """Numbers of poses that are aligned roughly, refined, and refined again after rotations about the object's own axes."""
@@ -38,7 +38,7 @@ class Candidates:
     poses: np.ndarray
     scores: np.ndarray
     tolerance_m: float
-    evidence: Evidence
+    evidence: PixelSamples
     gains: np.ndarray
 
 
@@ -52,18 +52,18 @@ def find_candidates(
     observed = observed_points(view, mask, model.diameter_m, rng)
     tolerance_m = TOLERANCE_M + TOLERANCE_OF_NOISE * measured_noise_m(view, mask)
     reach_px = float(view.intrinsics[0, 0] * model.diameter_m / np.median(observed[:, 2]))
-    evidence = Evidence.of(view, mask, reach_px, MANY, rng)
-    first = Evidence.of(view, mask, reach_px, 2 * FEW, rng)
+    evidence = PixelSamples.sample(view, mask, reach_px, MANY, rng)
+    first = PixelSamples.sample(view, mask, reach_px, 2 * FEW, rng)
     few = observed[:FEW]
-    poses = starts(observed, model, hidden_direction(view, mask)) if guesses is None else guesses
+    poses = find_start_poses(observed, model, hidden_direction(view, mask)) if guesses is None else guesses
     poses = align(few, model.surface, poses, iterations=8, kept_share=0.85)
-    scores = explained(model, poses, first, ROUGHLY * tolerance_m)
+    scores = score_poses(model, poses, first, ROUGHLY * tolerance_m)
     poses = align(few, model.surface, poses[_best(scores, FOLLOWED)], iterations=8, kept_share=0.9)
-    scores = explained(model, poses, first, tolerance_m)
+    scores = score_poses(model, poses, first, tolerance_m)
     best = _refined(observed, model, poses[_best(scores, REFINED)])
-    scores = explained(model, best, evidence, tolerance_m)
+    scores = score_poses(model, best, evidence, tolerance_m)
     turned = (best[_best(scores, 2), None] @ model.near_motions).reshape(-1, 4, 4)
-    rough = explained(model, turned, first, ROUGHLY * tolerance_m)
+    rough = score_poses(model, turned, first, ROUGHLY * tolerance_m)
     again = _refined(observed, model, turned[_spread(turned, rough, TURNED)])
     poses = np.concatenate([best, again])
     poses, scores = _finer(model, poses, evidence, tolerance_m)
@@ -71,17 +71,17 @@ def find_candidates(
         _spread(poses, scores, FOLLOWED_LAST)
     ]  # for a block with a hidden end, it takes a second rotation to undo a flip
     around = np.concatenate([centers, (centers[:, None] @ model.near_motions).reshape(-1, 4, 4)])
-    rough = explained(model, around, first, tolerance_m)
+    rough = score_poses(model, around, first, tolerance_m)
     around, around_scores = _finer(model, around[_spread(around, rough, AROUND)], evidence, tolerance_m)
     poses, scores = np.concatenate([poses, around]), np.concatenate([scores, around_scores])
     kept = poses[_spread(poses, scores, POLISHED)]
-    kept = np.concatenate([climbed(model, kept[:CLIMBED], evidence, tolerance_m), kept])
-    return _decided(model, kept, Evidence.of(view, mask, reach_px, ALL, rng), tolerance_m)
+    kept = np.concatenate([hill_climb(model, kept[:CLIMBED], evidence, tolerance_m), kept])
+    return _decided(model, kept, PixelSamples.sample(view, mask, reach_px, ALL, rng), tolerance_m)
 
 
-def _decided(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float) -> Candidates:
+def _decided(model: PoseModel, poses: np.ndarray, evidence: PixelSamples, tolerance_m: float) -> Candidates:
     """Return candidates scored with the final number of pixels, best first; the best ones are polished once more."""
-    finer = np.concatenate([poses, polished(model, poses[:FOLLOWED_LAST], evidence, tolerance_m, POLISHING)])
+    finer = np.concatenate([poses, refine_poses(model, poses[:FOLLOWED_LAST], evidence, tolerance_m, POLISHING)])
     gains = pixel_gains(model, finer, evidence, tolerance_m)
     scores = scores_of(gains, evidence)
     order = np.argsort(-scores, kind="stable")
@@ -102,21 +102,21 @@ def _refined(observed: np.ndarray, model: PoseModel, poses: np.ndarray) -> np.nd
 
 
 def _finer(
-    model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float
+    model: PoseModel, poses: np.ndarray, evidence: PixelSamples, tolerance_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the poses ``(K, 4, 4)``, polished where this improves the score, with their scores, best first.
 
     Surfaces close behind a thin object attract it: most polished poses of a fork on a table score less than before.
     """
-    after = polished(model, poses, evidence, tolerance_m, POLISHING)
-    before_scores, scores = (explained(model, each, evidence, tolerance_m) for each in (poses, after))
+    after = refine_poses(model, poses, evidence, tolerance_m, POLISHING)
+    before_scores, scores = (score_poses(model, each, evidence, tolerance_m) for each in (poses, after))
     better = scores >= before_scores
     poses, scores = np.where(better[:, None, None], after, poses), np.where(better, scores, before_scores)
     order = np.argsort(-scores, kind="stable")
     return poses[order], scores[order]
 
 
-def climbed(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float) -> np.ndarray:
+def hill_climb(model: PoseModel, poses: np.ndarray, evidence: PixelSamples, tolerance_m: float) -> np.ndarray:
     """Return poses ``(K, 4, 4)`` after hill climbing on the score, with steps along or about single axes of the camera.
 
     Alignment trusts each pixel's depth and is misled by edge pixels, to which the score is robust.
@@ -124,7 +124,7 @@ def climbed(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m
     length_m = CLIMB_SHARE * model.diameter_m
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     turns, shifts = CLIMB_RAD * axes, length_m * axes
-    scores = explained(model, poses, evidence, tolerance_m)
+    scores = score_poses(model, poses, evidence, tolerance_m)
     for scale in CLIMBS:
         rotations = Rotation.from_rotvec(scale * turns).as_matrix()
         tried = np.repeat(poses[:, None], 2 * len(shifts), axis=1)
@@ -132,7 +132,7 @@ def climbed(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m
         centers = poses[:, :3, :3] @ model.center + poses[:, :3, 3]
         tried[:, len(shifts) :, :3, :3] = rotations @ poses[:, None, :3, :3]
         tried[:, len(shifts) :, :3, 3] = centers[:, None] - tried[:, len(shifts) :, :3, :3] @ model.center
-        found = explained(model, tried.reshape(-1, 4, 4), evidence, tolerance_m).reshape(tried.shape[:2])
+        found = score_poses(model, tried.reshape(-1, 4, 4), evidence, tolerance_m).reshape(tried.shape[:2])
         best = found.argmax(1)
         rows = np.arange(len(poses))
         better = found[rows, best] > scores

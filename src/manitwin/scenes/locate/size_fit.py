@@ -9,11 +9,11 @@ import numpy as np
 
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform, transform_points
-from manitwin.scenes.locate.comparison import drawn_depth_m
 from manitwin.scenes.locate.depth_view import DepthView
 from manitwin.scenes.locate.estimate import AMBIGUOUS_MARGIN, Location, locate_in_view
 from manitwin.scenes.locate.pose_model import PoseModel
-from manitwin.scenes.locate.recognition import NO_MASK, Thing, Tried
+from manitwin.scenes.locate.pose_scoring import rendered_depth_m
+from manitwin.scenes.locate.recognition import NO_MASK, CandidateTwin, ViewedObject
 from manitwin.scenes.locate.search import Candidates, find_candidates
 
 LARGEST_FACTOR = 2.0
@@ -45,14 +45,14 @@ class SizeFit:
     model: PoseModel
 
     @property
-    def is_own(self) -> bool:
+    def is_nominal(self) -> bool:
         """Whether it is the twin's own size, up to the tolerance of grasps."""
         return abs(self.factor - 1) <= SAME_SIZE
 
 
-def thing_of_any_size(
+def locate_at_any_size(
     view: DepthView, masks: Sequence[np.ndarray], model: PoseModel, *, seed: int = 0
-) -> tuple[Thing, SizeFit]:
+) -> tuple[ViewedObject, SizeFit]:
     """Locate a twin of unknown size in each of several masks, and return the mask that it explains best, with its size.
 
     Raises UsageError if there is no mask.
@@ -61,8 +61,8 @@ def thing_of_any_size(
         raise UsageError(NO_MASK)
     fits = [(fit_size(view, mask, model, seed=seed), mask) for mask in masks]
     best, mask = max(fits, key=lambda each: each[0].location.best_score)
-    tried = (Tried(model.twin_id, None, best.location.best_score),)
-    return Thing(mask, best.location, best.model, tried), best
+    tried = (CandidateTwin(model.twin_id, None, best.location.best_score),)
+    return ViewedObject(mask, best.location, best.model, tried), best
 
 
 def fit_size(view: DepthView, mask: np.ndarray, model: PoseModel, *, seed: int = 0) -> SizeFit:
@@ -104,6 +104,6 @@ def _at_size(poses: np.ndarray, model: PoseModel, before: float, after: float) -
 
 
 def _depth_off_m(model: PoseModel, found: Candidates) -> float:
-    drawn, _ = drawn_depth_m(model, found.poses[:1], found.evidence)
+    drawn, _ = rendered_depth_m(model, found.poses[:1], found.evidence)
     off_m = np.abs(drawn[0] - found.evidence.depth_m)[: found.evidence.inside]
     return float(np.median(off_m[np.isfinite(off_m)]))

@@ -35,7 +35,7 @@ class WorldFrame:
     lean_rad: float
 
 
-def world_of_base(camera_to_base: np.ndarray, plane: Plane, about: np.ndarray) -> WorldFrame:
+def base_world_frame(camera_to_base: np.ndarray, plane: Plane, about: np.ndarray) -> WorldFrame:
     """Return the base's frame, levelled at the table below the point ``about (3,)`` in the camera's frame.
 
     Raises UsageError if the table tilts by more than 3 degrees, since the calibration or the plane is then wrong.
@@ -54,7 +54,7 @@ def world_of_base(camera_to_base: np.ndarray, plane: Plane, about: np.ndarray) -
     return WorldFrame(level @ camera_to_base, float(below[2]), True, lean_rad)
 
 
-def world_of_table(plane: Plane, about: np.ndarray) -> WorldFrame:
+def table_world_frame(plane: Plane, about: np.ndarray) -> WorldFrame:
     """Return a frame with the table at z = 0, +X away from the camera, and the point ``about (3,)`` above (0.5, 0)."""
     ahead = np.array([0.0, 0.0, 1.0]) - plane.normal[2] * plane.normal
     if np.linalg.norm(ahead) < 0.1:  # for a vertical view, away from the camera is up in the picture
@@ -71,7 +71,7 @@ def table_points(view: DepthView, world: WorldFrame, noise_m: float) -> np.ndarr
     return np.asarray(points[np.abs(points[:, 2] - world.table_m) < _ON_PLANE_M + 2 * noise_m, :2])
 
 
-def seen_rectangle(points: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def visible_rectangle(points: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners ``(2,)`` of the axis-aligned rectangle of the table's points ``(N, 2)``.
 
     It always contains ``kept (K, 2)``, the points of the objects; points more than a metre from their mean are ignored.

@@ -14,7 +14,7 @@ from manitwin.render.cameras import OPENGL_TO_OPENCV
 from manitwin.scenes.loaded_scene import object_pose
 from manitwin.scenes.perception.bop_models import MM, BopModel
 from manitwin.scenes.perception.classes import Classes
-from manitwin.scenes.perception.object_views import Box, SeenShape, silhouette_of
+from manitwin.scenes.perception.object_views import Box, RaycastShape, silhouette_of
 from manitwin.scenes.perception.output import Output
 from manitwin.scenes.perception.scene_truth import PictureTruth, SceneTruth
 from manitwin.scenes.perception.splits import split_of
@@ -38,7 +38,7 @@ def write_bop(
     """
     categories = {thing.twin_id: thing.category for scene in scenes for thing in scene.record.objects}
     models = {twin_id: BopModel.of_twin(twin_folder(twin_id)) for twin_id in sorted(categories)}
-    shapes = {twin_id: SeenShape.of_twin(twin_folder(twin_id)) for twin_id in models}
+    shapes = {twin_id: RaycastShape.of_twin(twin_folder(twin_id)) for twin_id in models}
     numbers = {twin_id: number for number, twin_id in enumerate(models, 1)}
     for twin_id, number in numbers.items():
         out.write_bytes(f"models/obj_{number:06d}.ply", models[twin_id].ply())
@@ -56,7 +56,7 @@ def _write_scene(
     folder: str,
     scene: SceneTruth,
     models: dict[str, BopModel],
-    shapes: dict[str, SeenShape],
+    shapes: dict[str, RaycastShape],
     numbers: dict[str, int],
     out: Output,
 ) -> None:

@@ -16,7 +16,7 @@ from manitwin.geometry.poses import transform
 from manitwin.geometry.sampling import sample_surface
 from manitwin.geometry.symmetry import Symmetries, find_symmetries
 from manitwin.models.annotators.surface_color import base_colors_at
-from manitwin.render.raycast import merged
+from manitwin.render.raycast import merge_parts
 from manitwin.twin.loaded_twin import Twin
 
 MM = 1000.0
@@ -38,7 +38,7 @@ class BopModel:
     def of_twin(cls, folder: Path) -> BopModel:
         """Read the model from a twin's folder; raises TwinError."""
         twin = Twin(folder)
-        mesh = merged(twin.visual)
+        mesh = merge_parts(twin.visual)
         colors = np.concatenate([_vertex_colors(part) for part in twin.visual])
         return cls(twin.record.twin_id, mesh, colors)
 
@@ -82,7 +82,7 @@ class BopModel:
         same_color = [motion for motion in turns if self._same_color(motion)]
         info |= self._named(turns, self.symmetries.axis is not None, "")
         round_in_color = self.symmetries.axis is not None and all(
-            self._same_color(_about(self.symmetries.axis, angle)) for angle in (0.7, 1.9, 3.3)
+            self._same_color(_axis_rotation(self.symmetries.axis, angle)) for angle in (0.7, 1.9, 3.3)
         )
         info |= self._named(same_color, round_in_color, "_with_color")
         return info
@@ -139,5 +139,5 @@ def _diameter(vertices_m: np.ndarray) -> float:
     return float(pdist(corners).max())
 
 
-def _about(axis: np.ndarray, angle_rad: float) -> np.ndarray:
+def _axis_rotation(axis: np.ndarray, angle_rad: float) -> np.ndarray:
     return np.asarray(trimesh.transformations.rotation_matrix(angle_rad, axis)[:3, :3])

@@ -36,7 +36,7 @@ class Classes:
         return {name: number for number, name in enumerate(self.parts, 1)}
 
     @classmethod
-    def of(cls, scenes: Iterable[SceneTruth]) -> Classes:
+    def from_scenes(cls, scenes: Iterable[SceneTruth]) -> Classes:
         """Return the classes of scenes."""
         categories, parts = set[str](), set[str]()
         for scene in scenes:

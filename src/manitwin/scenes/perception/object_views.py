@@ -11,7 +11,7 @@ import numpy as np
 from manitwin.geometry.poses import inverse, transform_points
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render.cameras import Camera, project
-from manitwin.render.raycast import merged
+from manitwin.render.raycast import merge_parts
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import NO_PART, Part
 
@@ -23,7 +23,7 @@ Box = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
-class SeenShape:
+class RaycastShape:
     """A twin's visual surface: a ray caster, its vertices ``(V, 3)`` and the part ``(F,)`` of each face.
 
     In the object frame, in metres. ``face_parts`` are indices into ``parts``; 255 (``NO_PART``) for none.
@@ -35,10 +35,10 @@ class SeenShape:
     parts: tuple[Part, ...]
 
     @classmethod
-    def of_twin(cls, folder: Path) -> SeenShape:
+    def of_twin(cls, folder: Path) -> RaycastShape:
         """Read the shape of the twin in a folder; raises TwinError."""
         twin = Twin(folder)
-        mesh = merged(twin.visual)
+        mesh = merge_parts(twin.visual)
         return cls(RayCaster(mesh), np.asarray(mesh.vertices), twin.face_parts(), tuple(twin.record.parts))
 
 
@@ -92,7 +92,7 @@ class Silhouette:
     box: Box | None
 
 
-def silhouette_of(shape: SeenShape, object_to_world: np.ndarray, camera: Camera) -> Silhouette:
+def silhouette_of(shape: RaycastShape, object_to_world: np.ndarray, camera: Camera) -> Silhouette:
     """Cast rays through all pixels that an object alone may cover; ``camera.camera_to_object`` is the pose in the world."""
     width, height = camera.width_px, camera.height_px
     left, top, right, bottom = _covered(shape, object_to_world, camera)
@@ -138,7 +138,7 @@ def view_of(silhouette: Silhouette, visible: np.ndarray) -> ObjectView:
     )
 
 
-def parts_seen(shape: SeenShape, silhouette: Silhouette, visible: np.ndarray) -> np.ndarray:
+def visible_parts(shape: RaycastShape, silhouette: Silhouette, visible: np.ndarray) -> np.ndarray:
     """Return the part ``(H, W) int`` at each visible pixel, as an index into ``shape.parts``; -1 for none."""
     parts = np.full(visible.shape, -1, np.int64)
     at = visible & silhouette.amodal
@@ -157,7 +157,7 @@ def box_of(mask: np.ndarray) -> Box | None:
     )  # fmt: skip
 
 
-def _covered(shape: SeenShape, object_to_world: np.ndarray, camera: Camera) -> tuple[int, int, int, int]:
+def _covered(shape: RaycastShape, object_to_world: np.ndarray, camera: Camera) -> tuple[int, int, int, int]:
     """Return the pixel range ``left, top, right, bottom`` that an object may cover, up to one picture size beyond the frame."""
     width, height = camera.width_px, camera.height_px
     pixels, depth_m = project(transform_points(object_to_world, shape.vertices_m), camera)

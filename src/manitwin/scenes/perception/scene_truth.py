@@ -30,11 +30,11 @@ REMEDY = "draw it again: manitwin layout DATASET -o SCENES --pictures"
 _Pixels = Annotated[int, Field(ge=0, le=9 * MAX_PICTURE_PX**2)]
 
 
-class _Facts(BaseModel):
+class _MetadataModel(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
 
 
-class _View(_Facts):
+class _View(_MetadataModel):
     visible_px: _Pixels
     amodal_px: _Pixels
     amodal_in_frame_px: _Pixels
@@ -42,21 +42,21 @@ class _View(_Facts):
     amodal_box: Box | None
 
 
-class _Camera(_Facts):
+class _Camera(_MetadataModel):
     width_px: Annotated[int, Field(ge=1, le=MAX_PICTURE_PX)]
     height_px: Annotated[int, Field(ge=1, le=MAX_PICTURE_PX)]
     K: tuple[tuple[Number, Number, Number], tuple[Number, Number, Number], tuple[Number, Number, Number]]
     objects: dict[str, _View]
 
 
-class _Part(_Facts):
+class _Part(_MetadataModel):
     object: str
     category: str
     part_id: str
     name: str
 
 
-class _Pictures(_Facts):
+class _Pictures(_MetadataModel):
     depth_unit_m: Annotated[float, Field(gt=0, le=1)]
     ids: dict[str, Annotated[int, Field(ge=1, le=65535)]]
     parts: dict[Annotated[int, Field(ge=1, le=65535)], _Part]

@@ -10,7 +10,7 @@ import numpy as np
 
 from manitwin.render.cameras import Camera, look_at
 from manitwin.scenes.loaded_scene import object_pose
-from manitwin.scenes.perception.object_views import ObjectView, SeenShape, parts_seen, silhouette_of, view_of
+from manitwin.scenes.perception.object_views import ObjectView, RaycastShape, silhouette_of, view_of, visible_parts
 from manitwin.scenes.scene import SceneCamera, SceneRecord
 
 
@@ -40,7 +40,7 @@ def intrinsics(camera: Camera) -> list[list[float]]:
     return [[focal_px, 0.0, camera.width_px / 2], [0.0, focal_px, camera.height_px / 2], [0.0, 0.0, 1.0]]
 
 
-def scene_parts(record: SceneRecord, shapes: Mapping[str, SeenShape]) -> list[ScenePart]:
+def scene_parts(record: SceneRecord, shapes: Mapping[str, RaycastShape]) -> list[ScenePart]:
     """Return the parts of all objects of a scene, in the record's order; ``shapes`` are by twin id."""
     return [
         ScenePart(thing.name, thing.category, part.id, part.name)
@@ -51,7 +51,7 @@ def scene_parts(record: SceneRecord, shapes: Mapping[str, SeenShape]) -> list[Sc
 
 def views_and_parts(
     record: SceneRecord,
-    shapes: Mapping[str, SeenShape],
+    shapes: Mapping[str, RaycastShape],
     parts: Sequence[ScenePart],
     camera: Camera,
     ids: np.ndarray | None,
@@ -71,6 +71,6 @@ def views_and_parts(
         shape, visible = shapes[thing.twin_id], ids == id_of[thing.name]
         silhouette = silhouette_of(shape, object_pose(thing), camera)
         views[thing.name] = view_of(silhouette, visible)
-        seen = parts_seen(shape, silhouette, visible)
+        seen = visible_parts(shape, silhouette, visible)
         numbers = np.where(seen >= 0, seen + first.get(thing.name, 0), numbers).astype(np.uint16)
     return views, numbers

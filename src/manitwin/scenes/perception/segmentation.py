@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.formats.output_folder import new_folder
 from manitwin.scenes.perception.bop import write_bop
 from manitwin.scenes.perception.cityscapes import write_cityscapes
@@ -24,7 +24,7 @@ REPORT = "report.html"
 
 
 @dataclass(frozen=True)
-class Segmented:
+class SegmentationCounts:
     """The counts of an export."""
 
     scenes: int
@@ -35,7 +35,7 @@ class Segmented:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _ExportOptions:
     """The options of an export."""
 
     validation_share: float
@@ -43,7 +43,7 @@ class _Asked:
     twin_folder: Callable[[str], Path]
 
 
-_Write = Callable[[Iterable[SceneTruth], Classes, Output, _Asked], None]
+_Write = Callable[[Iterable[SceneTruth], Classes, Output, _ExportOptions], None]
 
 FORMATS: Mapping[str, _Write] = {
     "coco": lambda scenes, classes, out, asked: write_coco(
@@ -73,7 +73,7 @@ def write_segmentation(
     dataset: str | Path | None = None,
     validation_share: float = VALIDATION_SHARE,
     points: int = POINTS,
-) -> Segmented:
+) -> SegmentationCounts:
     """Write the segmentation data set of rendered scenes in one format, atomically.
 
     ``scenes`` is the output of ``manitwin layout --pictures``, or one scene of it. ``dataset`` is the folder of its twins, by
@@ -82,22 +82,22 @@ def write_segmentation(
     ``out`` that is not empty.
     """
     if form not in FORMATS:
-        raise UsageError(choose_from("format", form, FORMATS))
+        raise UsageError(unknown_name_message("format", form, FORMATS))
     if not 0 <= validation_share <= 1:
         raise UsageError(f"a validation share of {validation_share:g}; give 0 to 1")
     files = scene_files(Path(scenes))
     if not files:
         raise UsageError(f"{scenes}: no scene found; create some with `manitwin layout DATASET -o {scenes} --pictures`")
     read = _Scenes(files)
-    classes = Classes.of(read)
+    classes = Classes.from_scenes(read)
     source = TwinSource(dataset if dataset is not None else dataset_of(files[0]))
     with new_folder(Path(out)) as folder:
         written = Output(folder)
-        FORMATS[form](read, classes, written, _Asked(validation_share, points, source.folder))
+        FORMATS[form](read, classes, written, _ExportOptions(validation_share, points, source.folder))
         written.write_bytes(REPORT, segmentation_page(read, classes, form, validation_share))
         count = written.written
     pictures = sum(len(scene.pictures) for scene in read)
-    return Segmented(len(files), pictures, len(classes.categories), len(classes.parts), count)
+    return SegmentationCounts(len(files), pictures, len(classes.categories), len(classes.parts), count)
 
 
 @dataclass(frozen=True)

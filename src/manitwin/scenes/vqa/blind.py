@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from manitwin.scenes.vqa.logistic import WordModel
 from manitwin.scenes.vqa.question import CLOSED, Question
-from manitwin.scenes.vqa.wording import worded
+from manitwin.scenes.vqa.wording import word_question
 
 _WORD = re.compile(r"<p\d+>|\w+")
 _PICTURE_PX = 1000
@@ -62,7 +62,7 @@ def _model(questions: Sequence[Question]) -> WordModel:
         for place, option in enumerate(_options(question)):
             texts.append(_features(question, place))
             answers.append(option == question.answer)
-    return WordModel.fitted(texts, answers)
+    return WordModel.from_texts(texts, answers)
 
 
 def _options(question: Question) -> tuple[str, ...]:
@@ -70,7 +70,7 @@ def _options(question: Question) -> tuple[str, ...]:
 
 
 def _features(question: Question, place: int) -> list[str]:
-    shown = worded(question, "thousand", _PICTURE_PX, _PICTURE_PX)
+    shown = word_question(question, "thousand", _PICTURE_PX, _PICTURE_PX)
     words = _WORD.findall(re.sub(r"\(\d+, \d+\)", "", shown.question).lower())
     option = re.sub(r"\(\d+, \d+\)", "point", shown.options[place]).lower()
     pairs = [f"{a} {b}" for a, b in pairwise(words)]

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 
 from manitwin.scenes.perception.output import Output
 from manitwin.scenes.vqa.question import Question
-from manitwin.scenes.vqa.wording import worded
+from manitwin.scenes.vqa.wording import word_question
 from manitwin.twin.store import canonical_json
 
 SHARD_PICTURES = 1000
@@ -40,7 +40,7 @@ def write_llava(questions: Sequence[Question], pictures: Pictures, convention: s
 
 
 def _conversation(question: Question, pictures: Pictures, convention: str) -> dict[str, Any]:
-    words = worded(question, convention, *pictures.size_px[question.picture])
+    words = word_question(question, convention, *pictures.size_px[question.picture])
     return {
         "id": question.question_id,
         "image": question.picture,
@@ -90,7 +90,7 @@ def write_parquet(questions: Sequence[Question], pictures: Pictures, convention:
 
 
 def _row(question: Question, pictures: Pictures, convention: str) -> dict[str, Any]:
-    words = worded(question, convention, *pictures.size_px[question.picture])
+    words = word_question(question, convention, *pictures.size_px[question.picture])
     return {
         **{name: getattr(question, name) for name in ("question_id", "scene_id", "camera", "category", "family", "kind")},
         "image": {"bytes": pictures.jpeg(question.picture), "path": question.picture},

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from manitwin.scenes.vqa.context import LEAST_INNER_PX, Context, sentence
 from manitwin.scenes.vqa.grasp_types import GRASP_WORDS, best_grasp
 from manitwin.scenes.vqa.interaction_points import interaction_points
-from manitwin.scenes.vqa.part_words import PART_GONE_PX, WIDE, is_told
+from manitwin.scenes.vqa.part_words import PART_GONE_PX, WIDE, is_locatable
+from manitwin.scenes.vqa.posed_objects import ObjectInPicture, PosedObject, inner_point, part_alone_px
 from manitwin.scenes.vqa.question import CHOICE, POINT, YES_NO, Draft
-from manitwin.scenes.vqa.things import Seen, Thing, inner_point, part_alone_px
 
 PART_SEEN_SHARE, PART_PX = 0.20, 100
 """A part is visible if this share of the pixels that it alone would cover is visible, and this number of pixels."""
@@ -18,18 +18,18 @@ MOST_OPTIONS = 4
 
 def functional_planning(asked: Context) -> Iterator[Draft]:
     """Ask where and how to touch objects, and about their functions."""
-    for seen in asked.named:
+    for seen in asked.named_objects:
         yield from _parts(asked, seen)
         yield from interaction_points(asked, seen)
     yield from _functions(asked)
     yield from _grasp_types(asked)
 
 
-def _parts(asked: Context, seen: Seen) -> Iterator[Draft]:
+def _parts(asked: Context, seen: ObjectInPicture) -> Iterator[Draft]:
     scale, words = seen.scale, asked.words_of(seen)
     names = [part.name for part in seen.thing.parts]
     for part in seen.thing.parts:
-        if names.count(part.name) > 1 or not is_told(part.name, seen.thing):
+        if names.count(part.name) > 1 or not is_locatable(part.name, seen.thing):
             continue
         number = next(
             number for number, each in asked.scene.parts.items()
@@ -63,7 +63,7 @@ def _parts(asked: Context, seen: Seen) -> Iterator[Draft]:
 
 def _functions(asked: Context) -> Iterator[Draft]:
     """Ask for the object with a function; none of its content words may occur in the function of another pointed object."""
-    told = [(seen, point, _function(seen.thing)) for seen, point in asked.pointed]
+    told = [(seen, point, _function(seen.thing)) for seen, point in asked.pointable_objects]
     for seen, _, function in told:
         others = [each for each in told if not _content(each[2]) & _content(function)]
         if function is None or len(others) < len(told) - 1 or len(others) < 2:
@@ -73,7 +73,7 @@ def _functions(asked: Context) -> Iterator[Draft]:
         last = f"<p{len(chosen) - 1}>"
         yield Draft(
             "object_for_function", asked.view.name, CHOICE, {"function": function}, last,
-            sentence(f"the one at {last}: {asked.called(seen)}"),
+            sentence(f"the one at {last}: {asked.reference_or_category(seen)}"),
             {"objects": asked.names(*(each[0] for each in chosen)), "answer": seen.thing.name,
              "functions": {each[0].thing.name: each[2] for each in chosen}},
             tuple(f"<p{place}>" for place in range(len(chosen))), tuple(each[1] for each in chosen),
@@ -97,20 +97,20 @@ def _content(function: str | None) -> set[str]:
     return {_SAME.get(word, word) for word in found}
 
 
-def _function(thing: Thing) -> str | None:
+def _function(thing: PosedObject) -> str | None:
     language = thing.shape.twin.record.language
     return language.function if language else None
 
 
 def _grasp_types(asked: Context) -> Iterator[Draft]:
-    for seen, point in asked.pointed:
+    for seen, point in asked.pointable_objects:
         grasp = best_grasp(seen.thing)
         if grasp is None:
             continue
         right = GRASP_WORDS[grasp[0]]
         yield Draft(
             "best_grasp_type", asked.view.name, CHOICE, {"p": "<p0>"}, right,
-            sentence(f"{right}; it is {asked.called(seen)}"),
+            sentence(f"{right}; it is {asked.reference_or_category(seen)}"),
             {"objects": asked.names(seen), "grasp_type": grasp[0], "confidence": grasp[1], "lead": grasp[2]},
             tuple(GRASP_WORDS.values()), (point,),
         )  # fmt: skip

@@ -11,18 +11,18 @@ from typing import Any
 
 from manitwin.scenes.perception.scene_truth import SceneTruth
 from manitwin.scenes.perception.splits import VALIDATION, split_of
-from manitwin.scenes.vqa.context import Context, Measured
+from manitwin.scenes.vqa.context import Context, SceneMeasurements
 from manitwin.scenes.vqa.detection import detection
 from manitwin.scenes.vqa.functional_planning import functional_planning
 from manitwin.scenes.vqa.language_grounding import language_grounding
+from manitwin.scenes.vqa.posed_objects import TwinShape, picture_views, posed_objects_of
 from manitwin.scenes.vqa.question import CHOICE, YES_NO, Draft, Question
-from manitwin.scenes.vqa.references import references
-from manitwin.scenes.vqa.rephrasing import filled
+from manitwin.scenes.vqa.references import find_references
+from manitwin.scenes.vqa.rephrasing import fill_slots
 from manitwin.scenes.vqa.scene_understanding import scene_understanding
 from manitwin.scenes.vqa.selection import IN_ORDER, chosen
 from manitwin.scenes.vqa.task_planning import task_planning
 from manitwin.scenes.vqa.templates import FAMILIES
-from manitwin.scenes.vqa.things import Shape, things_of, views_of
 
 MOST_DRAFTS = 24
 """Maximal number of drafts of a family (and answer, for yes/no questions) that one scene keeps."""
@@ -35,20 +35,22 @@ _MAKERS: Sequence[Callable[[Context], Iterable[Draft]]] = (
 )
 
 
-def drafts_of(scene: SceneTruth, shape_of: Callable[[str], Shape], categories: Sequence[str], seed: int) -> list[Draft]:
+def drafts_of(
+    scene: SceneTruth, shape_of: Callable[[str], TwinShape], categories: Sequence[str], seed: int
+) -> list[Draft]:
     """Return the drafts of all possible questions about the pictures of a scene; raises TwinError, UsageError.
 
     ``categories`` are those of all scenes; absent ones are asked about.
     """
-    things = things_of(scene, shape_of)
+    things = posed_objects_of(scene, shape_of)
     found: list[Draft] = []
-    measured = Measured()
-    for view in views_of(scene, things):
+    measured = SceneMeasurements()
+    for view in picture_views(scene, things):
         rng = random.Random(_seed(seed, scene.record.scene_id, view.name))
-        context = Context(scene, things, view, references(view, rng), categories, rng, measured)
+        context = Context(scene, things, view, find_references(view, rng), categories, rng, measured)
         for make in _MAKERS:
             found += (replace(draft, evidence=_with_words(draft, context)) for draft in make(context))
-    return _thinned(found, random.Random(_seed(seed, scene.record.scene_id, "thinned")))
+    return _limit_drafts(found, random.Random(_seed(seed, scene.record.scene_id, "thinned")))
 
 
 def _with_words(draft: Draft, context: Context) -> dict[str, Any]:
@@ -57,7 +59,7 @@ def _with_words(draft: Draft, context: Context) -> dict[str, Any]:
     return {**draft.evidence, "called": called}
 
 
-def _thinned(drafts: Sequence[Draft], rng: random.Random) -> list[Draft]:
+def _limit_drafts(drafts: Sequence[Draft], rng: random.Random) -> list[Draft]:
     """Limit the drafts of each family and, for yes/no questions, of each answer, so that a thousand scenes fit into memory."""
     sides: dict[tuple[str, str], list[Draft]] = defaultdict(list)
     for draft in drafts:
@@ -103,7 +105,7 @@ def _worded(
     if not held_out and template >= last:
         template += 1  # skip the held-out paraphrase
     wordings = (*family.paraphrases, *more)
-    text = filled(wordings[template], draft.slots)
+    text = fill_slots(wordings[template], draft.slots)
     draft = _shuffled(draft, rng)
     return Question(
         question_id=question_id, scene_id=scene_id, camera=draft.camera, split=split, category=family.category,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manitwin.scenes.vqa.things import Thing
+from manitwin.scenes.vqa.posed_objects import PosedObject
 
 GRASP_WORDS = {
     "parallel_jaw": "a parallel-jaw grasp",
@@ -16,7 +16,7 @@ LEAST_LEAD = 0.02
 """Least lead of the best grasp type's confidence over that of the next one."""
 
 
-def best_grasp(thing: Thing) -> tuple[str, float, float] | None:
+def best_grasp(thing: PosedObject) -> tuple[str, float, float] | None:
     """Return the type with the most confident grasp point, its confidence and its lead over other types; None if none leads."""
     best: dict[str, float] = {}
     points = thing.shape.twin.record.points

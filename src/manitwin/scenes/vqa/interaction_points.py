@@ -12,9 +12,9 @@ from manitwin.render.cameras import project
 from manitwin.render.raycast import cast_pixels
 from manitwin.scenes.vqa.context import LEAST_INNER_PX, Context, sentence
 from manitwin.scenes.vqa.part_words import ALL_ROUND, OPENINGS, PART_GONE_PX
+from manitwin.scenes.vqa.posed_objects import ObjectInPicture
 from manitwin.scenes.vqa.question import YES_NO, Draft, Point
 from manitwin.scenes.vqa.references import region
-from manitwin.scenes.vqa.things import Seen
 from manitwin.twin.point_records import FunctionalFrame, FunctionalPoint
 
 AROUND_M, AROUND_SHARE = 0.010, 0.10
@@ -30,7 +30,7 @@ POINT_DEPTH_M, IN_FRONT_M = 0.006, 0.015
 
 
 @dataclass(frozen=True)
-class _Place:
+class _PointSurroundings:
     """A point in the world ``(3,)`` and the pixels ``(N, 2)`` (row, column) that would show its surroundings if unoccluded.
 
     ``on_surface``: a visible point has the picture's depth; else the picture shows what lies behind it.
@@ -41,7 +41,7 @@ class _Place:
     on_surface: bool
 
 
-def interaction_points(asked: Context, seen: Seen) -> Iterator[Draft]:
+def interaction_points(asked: Context, seen: ObjectInPicture) -> Iterator[Draft]:
     """Ask for each functional point with a unique label whether another object occludes it."""
     points = seen.thing.shape.twin.record.points
     words, camera = asked.words_of(seen), asked.view.camera
@@ -49,7 +49,7 @@ def interaction_points(asked: Context, seen: Seen) -> Iterator[Draft]:
     for point in points.functional if points else ():
         if labels.count(point.label) > 1 or point.label in ALL_ROUND:
             continue
-        place = _place(asked, seen, point)
+        place = _point_surroundings(asked, seen, point)
         if place is None:
             continue
         column, row, depth_m = asked.view.pixel(place.point_m)
@@ -70,7 +70,7 @@ def interaction_points(asked: Context, seen: Seen) -> Iterator[Draft]:
                 "interaction_point_occluded", asked.view.name, YES_NO, slots, "no",
                 sentence(f"no, it is {at}, and no other object is in front of it"), evidence, points=(share,),
             )  # fmt: skip
-        front = [each for each in asked.named if each is not seen and (around == each.thing.number).all()]
+        front = [each for each in asked.named_objects if each is not seen and (around == each.thing.number).all()]
         if front and at_depth_m < depth_m - IN_FRONT_M and not _shows_part(asked, seen, point.label):
             yield Draft(
                 "interaction_point_occluded", asked.view.name, YES_NO, slots, "yes",
@@ -79,7 +79,7 @@ def interaction_points(asked: Context, seen: Seen) -> Iterator[Draft]:
             )  # fmt: skip
 
 
-def _place(asked: Context, seen: Seen, point: FunctionalPoint) -> _Place | None:
+def _point_surroundings(asked: Context, seen: ObjectInPicture, point: FunctionalPoint) -> _PointSurroundings | None:
     """Return the place of a functional point: the centre of an opening, otherwise a point on the surface.
 
     None if the object occludes the point itself, if the frame cuts off its surroundings, or for an opening without a frame.
@@ -90,11 +90,11 @@ def _place(asked: Context, seen: Seen, point: FunctionalPoint) -> _Place | None:
     world_m = transform_points(seen.thing.pose, np.array([point.position_m]))[0]
     if not _is_inside(asked, world_m) or not _faces_camera(asked, seen, world_m):
         return None
-    around_px = _around(asked, seen, world_m)
-    return None if around_px is None else _Place(world_m, around_px, on_surface=True)
+    around_px = _surrounding_pixels(asked, seen, world_m)
+    return None if around_px is None else _PointSurroundings(world_m, around_px, on_surface=True)
 
 
-def _opening(asked: Context, seen: Seen, frame: FunctionalFrame) -> _Place | None:
+def _opening(asked: Context, seen: ObjectInPicture, frame: FunctionalFrame) -> _PointSurroundings | None:
     """Return the centre of an opening that the camera looks into, without the object itself in between; None if it does not."""
     camera, eye = asked.view.camera, asked.view.camera.position
     rotation = rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz))
@@ -105,12 +105,12 @@ def _opening(asked: Context, seen: Seen, frame: FunctionalFrame) -> _Place | Non
     sight = (eye - center_m) / np.linalg.norm(eye - center_m)
     if (seen.thing.pose[:3, :3] @ rotation[:, 2]) @ sight < INTO_COSINE or not _is_inside(asked, center_m):
         return None
-    met_m, lengths_m = _met_alone(asked, seen, np.array(disc_m))
+    met_m, lengths_m = _self_occlusion_distances_m(asked, seen, np.array(disc_m))
     pixels = project(np.array(disc_m), camera)[0]
     inside = (pixels >= 0).all(1) & (pixels < [camera.width_px, camera.height_px]).all(1)
     if (met_m < lengths_m - POINT_DEPTH_M).any() or not inside.all():
         return None
-    return _Place(center_m, np.unique(pixels[:, ::-1].astype(int), axis=0), on_surface=False)
+    return _PointSurroundings(center_m, np.unique(pixels[:, ::-1].astype(int), axis=0), on_surface=False)
 
 
 def _is_inside(asked: Context, world_m: np.ndarray) -> bool:
@@ -121,7 +121,7 @@ def _is_inside(asked: Context, world_m: np.ndarray) -> bool:
     return edge_px <= column < camera.width_px - edge_px and edge_px <= row < camera.height_px - edge_px
 
 
-def _around(asked: Context, seen: Seen, world_m: np.ndarray) -> np.ndarray | None:
+def _surrounding_pixels(asked: Context, seen: ObjectInPicture, world_m: np.ndarray) -> np.ndarray | None:
     """Return the pixels ``(N, 2)`` (row, column) that would show the object's surface near one of its points if unoccluded.
 
     None if the frame cuts them off.
@@ -144,7 +144,7 @@ def _around(asked: Context, seen: Seen, world_m: np.ndarray) -> np.ndarray | Non
     return np.vstack([pixels[near], [[int(row), int(column)]]])
 
 
-def _shows_part(asked: Context, seen: Seen, label: str) -> bool:
+def _shows_part(asked: Context, seen: ObjectInPicture, label: str) -> bool:
     """Return whether the picture shows some of a part with the label of the point, whose place on the part is then unclear."""
     numbers = [
         number for number, each in asked.scene.parts.items()
@@ -154,13 +154,15 @@ def _shows_part(asked: Context, seen: Seen, label: str) -> bool:
     return bool(np.isin(asked.view.picture.parts, numbers).sum() > PART_GONE_PX * seen.scale)
 
 
-def _faces_camera(asked: Context, seen: Seen, world_m: np.ndarray) -> bool:
+def _faces_camera(asked: Context, seen: ObjectInPicture, world_m: np.ndarray) -> bool:
     """Return whether the object alone leaves one of its points visible to the camera."""
-    met_m, lengths_m = _met_alone(asked, seen, world_m[None])
+    met_m, lengths_m = _self_occlusion_distances_m(asked, seen, world_m[None])
     return bool(abs(met_m[0] - lengths_m[0]) < POINT_DEPTH_M)
 
 
-def _met_alone(asked: Context, seen: Seen, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _self_occlusion_distances_m(
+    asked: Context, seen: ObjectInPicture, points_m: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the distances from the camera to the object alone along the ray to each point ``(N, 3)``, and to the point."""
     eye = asked.view.camera.position
     lengths_m = np.linalg.norm(points_m - eye, axis=1)

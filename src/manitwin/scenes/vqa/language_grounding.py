@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from manitwin.models.annotators.surface_color import are_near
+from manitwin.models.annotators.surface_color import are_similar_colors
 from manitwin.scenes.vqa.context import Context, sentence
 from manitwin.scenes.vqa.grasp_types import GRASP_WORDS, best_grasp
+from manitwin.scenes.vqa.posed_objects import ObjectInPicture
 from manitwin.scenes.vqa.question import CHOICE, POINT, TEXT, Draft, Point
 from manitwin.scenes.vqa.references import REGION_MARGIN, region
-from manitwin.scenes.vqa.things import Seen
 
 MOST_OPTIONS = 4
 QUARTERS = ("top left", "top right", "bottom left", "bottom right")
@@ -25,7 +25,7 @@ def language_grounding(asked: Context) -> Iterator[Draft]:
 
 
 def _points(asked: Context) -> Iterator[Draft]:
-    for seen, point in asked.pointed:
+    for seen, point in asked.pointable_objects:
         if seen.thing.name in asked.words:
             yield Draft(
                 "point_at_object", asked.view.name, POINT, {"a": asked.words_of(seen)}, "<p0>", "<p0>",
@@ -34,8 +34,8 @@ def _points(asked: Context) -> Iterator[Draft]:
 
 
 def _objects_at_points(asked: Context) -> Iterator[Draft]:
-    words = [asked.words_of(each) for each in asked.named]
-    for seen, point in asked.pointed:
+    words = [asked.words_of(each) for each in asked.named_objects]
+    for seen, point in asked.pointable_objects:
         if seen.thing.name not in asked.words or len(words) < 3:
             continue
         right = asked.words_of(seen)
@@ -48,17 +48,17 @@ def _objects_at_points(asked: Context) -> Iterator[Draft]:
 
 
 def _by_color(asked: Context) -> Iterator[Draft]:
-    marked = [(seen, point) for seen, point in asked.pointed if seen.color]
+    marked = [(seen, point) for seen, point in asked.pointable_objects if seen.color]
     for seen, _ in marked:
         color = seen.color or ""
-        others = [each for each in marked if not are_near(each[0].color or "", color)]
+        others = [each for each in marked if not are_similar_colors(each[0].color or "", color)]
         if len(others) < 2:
             continue
         chosen = asked.rng.sample(others, min(len(others), MOST_OPTIONS - 1))
         chosen.append(next(each for each in marked if each[0] is seen))
         yield Draft(
             "object_by_color", asked.view.name, CHOICE, {"color": color}, f"<p{len(chosen) - 1}>",
-            sentence(f"the one at <p{len(chosen) - 1}>: {asked.called(seen)}"),
+            sentence(f"the one at <p{len(chosen) - 1}>: {asked.reference_or_category(seen)}"),
             {"objects": asked.names(*(each for each, _ in chosen)), "answer": seen.thing.name,
              "colors": {each.thing.name: each.color for each, _ in chosen}},
             tuple(f"<p{place}>" for place in range(len(chosen))), tuple(point for _, point in chosen),
@@ -66,7 +66,7 @@ def _by_color(asked: Context) -> Iterator[Draft]:
 
 
 def _regions(asked: Context) -> Iterator[Draft]:
-    for seen, point in asked.pointed:
+    for seen, point in asked.pointable_objects:
         box = seen.view.visible_box
         if seen.thing.name not in asked.words or box is None:
             continue
@@ -86,7 +86,7 @@ def _regions(asked: Context) -> Iterator[Draft]:
         )  # fmt: skip
 
 
-def _place(asked: Context, seen: Seen, point: Point) -> str | None:
+def _place(asked: Context, seen: ObjectInPicture, point: Point) -> str | None:
     """Return the ninth of the picture that contains an object's point and the centre of its box; None if they differ."""
     box, camera = seen.view.visible_box, asked.view.camera
     if box is None:
@@ -96,7 +96,7 @@ def _place(asked: Context, seen: Seen, point: Point) -> str | None:
 
 
 def _locate_and_grasp(asked: Context) -> Iterator[Draft]:
-    for seen, point in asked.pointed:
+    for seen, point in asked.pointable_objects:
         grasp = best_grasp(seen.thing)
         where = _place(asked, seen, point)
         if seen.thing.name not in asked.words or grasp is None or where is None:

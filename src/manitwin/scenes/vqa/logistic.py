@@ -21,7 +21,7 @@ class WordModel:
     bias: float
 
     @classmethod
-    def fitted(cls, texts: Sequence[Iterable[str]], answers: Sequence[bool]) -> WordModel:
+    def from_texts(cls, texts: Sequence[Iterable[str]], answers: Sequence[bool]) -> WordModel:
         """Fit the words of texts to their answers by L-BFGS; the same input gives the same weights."""
         rows = [sorted(set(text)) for text in texts]
         place = {word: number for number, word in enumerate(sorted({word for row in rows for word in row}))}

@@ -37,7 +37,7 @@ def noun_of(category: str) -> str:
     return _WHAT_FOLLOWS.split(category.removeprefix("pair of "), maxsplit=1)[0].split()[-1]
 
 
-def names_cut_down(names: Iterable[str]) -> frozenset[str]:
+def with_shortened_names(names: Iterable[str]) -> frozenset[str]:
     """Return names with all shorter ones that people say for them: ``measuring cup`` and ``cup``; ``jar of honey`` and ``jar``.
 
     What its last word would make another kind of thing stays whole: a magnifying glass is no glass.
@@ -57,12 +57,12 @@ def words_of(category: str) -> frozenset[str]:
 
 
 @cache
-def counter_of(category: str) -> str | None:
+def noun_counter(category: str) -> str | None:
     """Return the counter of a category: ``pair of`` scissors, a ``bar of`` soap; None for countable nouns."""
     if category.split()[-1] in PAIRS:
         return None if category.startswith("pair of ") else "pair of"
     prior = prior_names.named(category)
-    return None if prior is None else prior_names.counter_of(prior, category)
+    return None if prior is None else prior_names.counter_phrase(prior, category)
 
 
 @cache

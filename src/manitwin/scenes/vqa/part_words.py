@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from manitwin.scenes.vqa.things import Thing
+from manitwin.scenes.vqa.posed_objects import PosedObject
 
 ALL_ROUND = frozenset(
     {
@@ -26,12 +26,12 @@ PART_GONE_PX = 2
 """A part is invisible if no more pixels show it (of a picture of 512 x 512)."""
 
 
-def is_told(name: str, thing: Thing) -> bool:
+def is_locatable(name: str, thing: PosedObject) -> bool:
     """Return whether a picture identifies the place that a part's name denotes: a box that lies has no top."""
     word = name.casefold()
-    return word not in UNTOLD_SIDES and (word not in SIDES_OF_WHAT_STANDS or stands(thing))
+    return word not in UNTOLD_SIDES and (word not in SIDES_OF_WHAT_STANDS or is_upright(thing))
 
 
-def stands(thing: Thing) -> bool:
+def is_upright(thing: PosedObject) -> bool:
     """Return whether +Z of an object's frame points up."""
     return bool(thing.pose[2, 2] >= np.cos(STANDS_RAD))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import random
 from collections.abc import Collection
 
-from manitwin.models.annotators.surface_color import are_near
-from manitwin.models.annotators.words import article
-from manitwin.scenes.vqa.nouns import counter_of, noun_of, nouns_of, words_of
-from manitwin.scenes.vqa.things import Seen, Thing, View
+from manitwin.models.annotators.descriptions import article
+from manitwin.models.annotators.surface_color import are_similar_colors
+from manitwin.scenes.vqa.nouns import noun_counter, noun_of, nouns_of, words_of
+from manitwin.scenes.vqa.posed_objects import ObjectInPicture, PosedObject, View
 
 MARGIN_PX = 40
 """Least distance of the outermost object from the next (px of a picture 512 wide)."""
@@ -26,7 +26,7 @@ REGION_MARGIN = 0.03
 """Least distance of a point from the border between two regions (share of the picture)."""
 
 
-def references(view: View, rng: random.Random) -> dict[str, str]:
+def find_references(view: View, rng: random.Random) -> dict[str, str]:
     """Return a reference such as ``the yellow bottle`` by object name, for each clear object that has a unique one.
 
     The rivals of an object are the visible objects that its noun may also denote. Without rivals, its category is used, at
@@ -35,28 +35,28 @@ def references(view: View, rng: random.Random) -> dict[str, str]:
     """
     found = {}
     shown = [each for each in view.seen if not each.is_hidden]
-    for seen in view.clear:
-        rivals = [each for each in shown if each is not seen and _may_be_called(each, seen.thing)]
+    for seen in view.clear_objects:
+        rivals = [each for each in shown if each is not seen and _may_share_noun(each, seen.thing)]
         words = _words(seen, rivals, rng, MARGIN_PX * view.camera.width_px / 512)
         if words is not None:
             found[seen.thing.name] = words
     return found
 
 
-def _may_be_called(other: Seen, thing: Thing) -> bool:
+def _may_share_noun(other: ObjectInPicture, thing: PosedObject) -> bool:
     """Return whether the noun of an object may denote another one too: an allen key and a door key may both be "the key"."""
     noun = thing.head
     names_it = noun == thing.category == other.thing.category.split()[-1]
     return names_it or noun in nouns_of(other.thing.category) or other.thing.head in _GENERAL.get(noun, ())
 
 
-def _words(seen: Seen, rivals: list[Seen], rng: random.Random, margin_px: float) -> str | None:
+def _words(seen: ObjectInPicture, rivals: list[ObjectInPicture], rng: random.Random, margin_px: float) -> str | None:
     thing = seen.thing
     with_color = rng.random() < 0.5
     if not rivals:
         return f"the {one_of(thing.category, seen.color if with_color else None)}"
     colors = [each.color for each in rivals]
-    if seen.color and all(color and not are_near(color, seen.color) for color in colors):
+    if seen.color and all(color and not are_similar_colors(color, seen.color) for color in colors):
         return f"the {one_of(thing.category, seen.color)}"
     if not all(each.is_clear and each.thing.head == thing.head for each in rivals):
         return None
@@ -82,7 +82,7 @@ def region(x: float, y: float) -> str | None:
 
 def one_of(noun: str, color: str | None = None) -> str:
     """Return the words for one object: ``black pair of scissors``, ``yellow bottle``, ``bar of soap``."""
-    counter = counter_of(noun)
+    counter = noun_counter(noun)
     thing = noun if counter is None else f"{counter} {noun}"
     return f"{color} {thing}" if color else thing
 

@@ -121,7 +121,7 @@ def rephrasings_json(found: Sequence[Rephrasing], model: str) -> dict[str, Any]:
     return {"model": model, "families": families}
 
 
-def why_not(family: str, text: str) -> str | None:
+def rejection_reason(family: str, text: str) -> str | None:
     """Return the reason code why a wording is rejected; None if it is accepted."""
     *own, held_out = FAMILIES[family].paraphrases
     if not 8 <= len(text) <= MOST_CHARACTERS or printable_line(text) != text or text.strip()[-1] not in "?.":
@@ -144,7 +144,7 @@ def why_not(family: str, text: str) -> str | None:
     return "meaning_changed" if always - words or (words & _DECIDING) - ever else None
 
 
-def filled(template: str, slots: Mapping[str, str]) -> str:
+def fill_slots(template: str, slots: Mapping[str, str]) -> str:
     """Return a wording with its slots filled, and with a capital letter at the start of each sentence."""
     text = ""
     for part in re.split(r"(\{[A-Za-z0-9]+\})", template):
@@ -159,7 +159,7 @@ def _checked(family: str, texts: Sequence[str]) -> list[Rephrasing]:
     seen: set[frozenset[str]] = set()
     checked = []
     for text in texts:
-        reason = why_not(family, text)
+        reason = rejection_reason(family, text)
         if reason is None and _words(text) in seen:
             reason = "same_words"
         seen.add(_words(text))

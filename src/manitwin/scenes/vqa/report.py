@@ -13,7 +13,7 @@ from manitwin.formats.image_file import png_of
 from manitwin.scenes.vqa.blind import blind_scores
 from manitwin.scenes.vqa.question import CATEGORIES, CLOSED, Question
 from manitwin.scenes.vqa.templates import FAMILIES
-from manitwin.scenes.vqa.wording import worded
+from manitwin.scenes.vqa.wording import word_question
 
 SAMPLE_PX = 256
 MOST_ANSWERS = 4
@@ -69,7 +69,7 @@ def marked(rgb: np.ndarray, question: Question) -> np.ndarray:
 
 
 def _sample(question: Question, rgb: np.ndarray, convention: str) -> Picture:
-    words = worded(question, convention, rgb.shape[1], rgb.shape[0])
+    words = word_question(question, convention, rgb.shape[1], rgb.shape[0])
     small = cv2.resize(
         marked(rgb, question), (SAMPLE_PX, SAMPLE_PX * rgb.shape[0] // rgb.shape[1]), interpolation=cv2.INTER_AREA
     )

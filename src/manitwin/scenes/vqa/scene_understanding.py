@@ -9,9 +9,9 @@ import numpy as np
 
 from manitwin.scenes.vqa.context import Context, sentence
 from manitwin.scenes.vqa.grasp_types import GRASP_WORDS, best_grasp
+from manitwin.scenes.vqa.posed_objects import TwinShape
 from manitwin.scenes.vqa.question import CHOICE, NUMBER, YES_NO, Draft
-from manitwin.scenes.vqa.sweeps import LONGEST_M, Way
-from manitwin.scenes.vqa.things import Shape
+from manitwin.scenes.vqa.sweeps import LONGEST_M, SweptPath
 
 SIDE_M, SIDE_PX = 0.06, 50
 """Least distance between two objects in a question about sides."""
@@ -44,11 +44,11 @@ def scene_understanding(asked: Context) -> Iterator[Draft]:
 def _sides(asked: Context) -> Iterator[Draft]:
     robot = next((each.robot for each in asked.directions if each.frame == "robot"), None)
     least_px = SIDE_PX * asked.view.camera.width_px / 512
-    for a, b in permutations(asked.named, 2):
+    for a, b in permutations(asked.named_objects, 2):
         slots = {"a": asked.words_of(a), "b": asked.words_of(b)}
         left_m = float(a.thing.center_m[1] - b.thing.center_m[1])
-        spans_m = [(each.thing.placed.bounds[0][1], each.thing.placed.bounds[1][1]) for each in (a, b)]
-        if robot is not None and abs(left_m) > SIDE_M and sides_are_apart(spans_m[0], spans_m[1]):
+        spans_m = [(each.thing.placed_hulls.bounds[0][1], each.thing.placed_hulls.bounds[1][1]) for each in (a, b)]
+        if robot is not None and abs(left_m) > SIDE_M and are_sides_unambiguous(spans_m[0], spans_m[1]):
             side = "left" if left_m > 0 else "right"
             yield Draft(
                 "side_for_robot", asked.view.name, CHOICE, {**slots, "robot": robot}, side,
@@ -56,7 +56,7 @@ def _sides(asked: Context) -> Iterator[Draft]:
                 {"objects": asked.names(a, b), "frame": "robot", "left_m": round(left_m, 4)}, ("left", "right"),
             )  # fmt: skip
         left_px = b.column - a.column
-        if abs(left_px) > least_px and sides_are_apart(a.columns, b.columns):
+        if abs(left_px) > least_px and are_sides_unambiguous(a.columns, b.columns):
             side = "left" if left_px > 0 else "right"
             yield Draft(
                 "side_in_picture", asked.view.name, CHOICE, slots, side,
@@ -65,7 +65,7 @@ def _sides(asked: Context) -> Iterator[Draft]:
             )  # fmt: skip
 
 
-def sides_are_apart(one: tuple[float, float], other: tuple[float, float]) -> bool:
+def are_sides_unambiguous(one: tuple[float, float], other: tuple[float, float]) -> bool:
     """Return whether neither of two intervals contains the middle of the other; otherwise the side is ambiguous."""
     middles = sum(one) / 2, sum(other) / 2
     return not one[0] <= middles[1] <= one[1] and not other[0] <= middles[0] <= other[1]
@@ -74,7 +74,7 @@ def sides_are_apart(one: tuple[float, float], other: tuple[float, float]) -> boo
 def _gaps(asked: Context) -> Iterator[Draft]:
     if asked.looks_down_rad < FLATTEST_RAD:
         return
-    for a, b in combinations(asked.named, 2):
+    for a, b in combinations(asked.named_objects, 2):
         if asked.rng.random() < 0.5:
             a, b = b, a
         measured = a if a.view.visible_share >= WHOLE_SHARE else b
@@ -97,10 +97,10 @@ def _gaps(asked: Context) -> Iterator[Draft]:
 def _neighbours(asked: Context) -> Iterator[Draft]:
     if not asked.view.shows_all or len(asked.things) < 4:
         return
-    for seen in asked.named:
+    for seen in asked.named_objects:
         gaps = sorted(
             (asked.gap_m(seen.thing, other.thing), other.thing.name)
-            for other in asked.view.clear if other is not seen
+            for other in asked.view.clear_objects if other is not seen
         )  # fmt: skip
         if gaps[1][0] - gaps[0][0] <= NEARER_M or any(name not in asked.words for _, name in gaps[:1]):
             continue
@@ -111,26 +111,26 @@ def _neighbours(asked: Context) -> Iterator[Draft]:
         yield Draft(
             "nearest_object", asked.view.name, CHOICE, {"a": asked.words_of(seen)}, right,
             sentence(f"{right} is nearest to {asked.words_of(seen)}"),
-            {"objects": asked.names(seen, asked.view.of(gaps[0][1])), "answer": gaps[0][1],
+            {"objects": asked.names(seen, asked.view.view_of_object(gaps[0][1])), "answer": gaps[0][1],
              "gaps_m": {name: round(gap, 4) for gap, name in gaps}},
             (*asked.rng.sample(others, min(len(others), MOST_OPTIONS - 1)), right),
         )  # fmt: skip
 
 
 def _clearances(asked: Context) -> Iterator[Draft]:
-    grasps = {each.thing.name: best_grasp(each.thing) for each in asked.view.clear}
+    grasps = {each.thing.name: best_grasp(each.thing) for each in asked.view.clear_objects}
     for seen in asked.slidable:
         directions = asked.rng.sample(asked.directions, min(2, len(asked.directions)))
         for direction in directions:
-            way = asked.way(seen, direction)
+            way = asked.swept_path(seen, direction)
             lengths = [
                 cm for cm in CLEARANCES_CM
-                if cm / 100 < min(way.leaves_m, LONGEST_M) and way.verdict(cm / 100) is not None
+                if cm / 100 < min(way.leaves_m, LONGEST_M) and way.is_hit_within(cm / 100) is not None
                 and asked.in_view(seen, np.array(direction.vector) * cm / 100)
             ]  # fmt: skip
             for cm in lengths:
-                free = not way.verdict(cm / 100)
-                in_the_way, told = _in_the_way(asked, way, cm)
+                free = not way.is_hit_within(cm / 100)
+                in_the_way, told = _clearance_evidence(asked, way, cm)
                 if not free and in_the_way is None:
                     continue
                 evidence = {
@@ -155,7 +155,7 @@ def _clearances(asked: Context) -> Iterator[Draft]:
                     )  # fmt: skip
 
 
-def _in_the_way(asked: Context, way: Way, cm: int) -> tuple[str | None, dict[str, object]]:
+def _clearance_evidence(asked: Context, way: SweptPath, cm: int) -> tuple[str | None, dict[str, object]]:
     hit = way.first_hit(cm / 100)
     if hit is None or hit[0] not in asked.words:
         return None, {}
@@ -165,15 +165,15 @@ def _in_the_way(asked: Context, way: Way, cm: int) -> tuple[str | None, dict[str
 def _heights(asked: Context) -> Iterator[Draft]:
     if asked.looks_down_rad > STEEPEST_RAD:
         return
-    for (a, p), (b, q) in permutations(asked.pointed, 2):
-        top_m = float(a.thing.placed.bounds[1][2]), float(b.thing.placed.bounds[1][2])
+    for (a, p), (b, q) in permutations(asked.pointable_objects, 2):
+        top_m = float(a.thing.placed_hulls.bounds[1][2]), float(b.thing.placed_hulls.bounds[1][2])
         if abs(top_m[0] - top_m[1]) < TALLER_M:
             continue
         taller = a if top_m[0] > top_m[1] else b
         yield Draft(
             "taller", asked.view.name, CHOICE, {"p": "<p0>", "q": "<p1>", "surface": asked.surface},
             "<p0>" if taller is a else "<p1>",
-            sentence(f"the one at {'<p0>' if taller is a else '<p1>'}: {asked.called(taller)}"),
+            sentence(f"the one at {'<p0>' if taller is a else '<p1>'}: {asked.reference_or_category(taller)}"),
             {"objects": asked.names(a, b), "answer": taller.thing.name,
              "top_m": {each.thing.name: round(top, 4) for each, top in zip((a, b), top_m, strict=True)}},
             ("<p0>", "<p1>"), (p, q),
@@ -181,30 +181,30 @@ def _heights(asked: Context) -> Iterator[Draft]:
 
 
 def _occluders(asked: Context) -> Iterator[Draft]:
-    from manitwin.scenes.perception.object_views import SeenShape, silhouette_of
+    from manitwin.scenes.perception.object_views import RaycastShape, silhouette_of
 
-    for seen in asked.named:
+    for seen in asked.named_objects:
         view = seen.view
-        if view.amodal_in_frame_px - view.visible_px < HIDING_PX * seen.scale or len(asked.named) < 4:
+        if view.amodal_in_frame_px - view.visible_px < HIDING_PX * seen.scale or len(asked.named_objects) < 4:
             continue
         shape = seen.thing.shape
-        alone = SeenShape(shape.caster, _corners(shape), np.zeros(0, np.uint8), ())
+        alone = RaycastShape(shape.caster, _corners(shape), np.zeros(0, np.uint8), ())
         hidden = silhouette_of(alone, seen.thing.pose, asked.view.camera).amodal & ~seen.mask
         counts = {each.thing.name: int((each.mask & hidden).sum()) for each in asked.view.seen if each is not seen}
         name, most = max(counts.items(), key=lambda item: item[1])
         if most < HIDING_PX * seen.scale or most < HIDING_SHARE * hidden.sum() or name not in asked.words:
             continue
         right = asked.words[name]
-        others = [asked.words_of(each) for each in asked.named if each is not seen and each.thing.name != name]
-        if any(counts[each.thing.name] for each in asked.named if each is not seen and each.thing.name != name):
+        others = [asked.words_of(each) for each in asked.named_objects if each is not seen and each.thing.name != name]
+        if any(counts[each.thing.name] for each in asked.named_objects if each is not seen and each.thing.name != name):
             continue
         yield Draft(
             "occluder", asked.view.name, CHOICE, {"a": asked.words_of(seen)}, right,
             sentence(f"{right} hides some of {asked.words_of(seen)}"),
-            {"objects": asked.names(seen, asked.view.of(name)), "answer": name, "hidden_px": most},
+            {"objects": asked.names(seen, asked.view.view_of_object(name)), "answer": name, "hidden_px": most},
             (*asked.rng.sample(others, min(len(others), MOST_OPTIONS - 1)), right),
         )  # fmt: skip
 
 
-def _corners(shape: Shape) -> np.ndarray:
+def _corners(shape: TwinShape) -> np.ndarray:
     return np.concatenate([mesh.vertices for mesh in shape.twin.visual])

@@ -80,7 +80,7 @@ def _balanced_yes_no(found: list[tuple[int, Draft]], rng: random.Random) -> list
     answers = [draft.answer == "yes" for _, draft in found]
     if len(set(answers)) < 2:
         return []
-    model = WordModel.fitted([words_of(draft) for _, draft in found], answers)
+    model = WordModel.from_texts([words_of(draft) for _, draft in found], answers)
     sides: dict[bool, list[tuple[int, Draft]]] = {True: [], False: []}
     for each, answer in zip(found, answers, strict=True):
         yes = model.probability(words_of(each[1]))
@@ -98,9 +98,9 @@ def _balanced_choices(found: list[tuple[int, Draft]], rng: random.Random) -> lis
         found = [
             (scene, draft)
             for scene, draft in found
-            if rng.random() < sure / len(draft.options) / _told(model, draft)[draft.answer]
+            if rng.random() < sure / len(draft.options) / _option_probabilities(model, draft)[draft.answer]
         ]
-        if len(found) < LEAST_TOLD or _told_beyond_chance(found) <= TOLD_MORE:
+        if len(found) < LEAST_TOLD or _excess_accuracy(found) <= TOLD_MORE:
             break
     return found
 
@@ -108,16 +108,18 @@ def _balanced_choices(found: list[tuple[int, Draft]], rng: random.Random) -> lis
 def _option_model(found: Sequence[tuple[int, Draft]]) -> WordModel:
     """Fit a model that predicts from the words of an option whether it is the answer."""
     pairs = [(draft, option) for _, draft in found for option in draft.options]
-    return WordModel.fitted([words_of(*pair) for pair in pairs], [option == draft.answer for draft, option in pairs])
+    return WordModel.from_texts(
+        [words_of(*pair) for pair in pairs], [option == draft.answer for draft, option in pairs]
+    )
 
 
-def _told(model: WordModel, draft: Draft) -> dict[str, float]:
+def _option_probabilities(model: WordModel, draft: Draft) -> dict[str, float]:
     """Return the probability of each option from its words, normalized over the options."""
     odds = {option: _odds(model.probability(words_of(draft, option))) for option in draft.options}
     return {option: value / sum(odds.values()) for option, value in odds.items()}
 
 
-def _told_beyond_chance(found: Sequence[tuple[int, Draft]]) -> float:
+def _excess_accuracy(found: Sequence[tuple[int, Draft]]) -> float:
     """Return the excess accuracy over chance of the likeliest options, with two-fold cross-validation over the scenes.
 
     This is the mean over ``SPLITS`` ways to halve the scenes, with at most ``MOST_ASKED`` drafts.
@@ -131,7 +133,7 @@ def _told_beyond_chance(found: Sequence[tuple[int, Draft]]) -> float:
         for half, others in (halves, halves[::-1]):
             model = _option_model(others)
             for _, draft in half:
-                told = _told(model, draft)
+                told = _option_probabilities(model, draft)
                 gained += (max(told, key=told.__getitem__) == draft.answer) - 1 / len(told)
         asked += len(found)
     return gained / asked if asked else 0.0

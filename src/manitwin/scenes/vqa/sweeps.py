@@ -11,7 +11,7 @@ from manitwin.geometry.hull_distance import ConvexParts, PlacedParts, overlap_de
 from manitwin.geometry.hull_sweep import least_contacts
 from manitwin.scenes.loaded_scene import furniture_boxes
 from manitwin.scenes.scene import SceneRecord
-from manitwin.scenes.vqa.things import Thing
+from manitwin.scenes.vqa.posed_objects import PosedObject
 
 TOUCH_M = 0.0005
 """Two bodies nearer than this touch."""
@@ -27,7 +27,7 @@ LONGEST_M = 0.20
 
 
 @dataclass(frozen=True)
-class Meeting:
+class ObstacleContact:
     """The distances (m) at which an object comes within the margin of another, and touches it; infinite for never."""
 
     near_m: float
@@ -35,10 +35,10 @@ class Meeting:
 
 
 @dataclass(frozen=True)
-class Way:
+class SweptPath:
     """All meetings along a straight way, by obstacle name; ``leaves_m`` is where the object's centre leaves its support."""
 
-    meetings: Mapping[str, Meeting]
+    meetings: Mapping[str, ObstacleContact]
     leaves_m: float
 
     def first_hit(self, length_m: float) -> tuple[str, float] | None:
@@ -51,7 +51,7 @@ class Way:
             return None
         return hits[0][1], hits[0][0]
 
-    def order_is_sure(self) -> bool:
+    def is_order_certain(self) -> bool:
         """Return whether the first contact clearly precedes the second."""
         touches = sorted(meeting.touch_m for meeting in self.meetings.values())
         return len(touches) < 2 or touches[1] - touches[0] > MARGIN_M
@@ -60,22 +60,22 @@ class Way:
         """Return whether no obstacle comes within the margin."""
         return all(meeting.near_m > length_m for meeting in self.meetings.values())
 
-    def verdict(self, length_m: float) -> bool | None:
+    def is_hit_within(self, length_m: float) -> bool | None:
         """Return whether the first ``length_m`` of the way contain a hit; None if that is uncertain."""
         if self.first_hit(length_m) is not None:
             return True
         return False if self.is_free(length_m) else None
 
 
-def can_be_slid(thing: Thing, record: SceneRecord) -> bool:
+def can_be_slid(thing: PosedObject, record: SceneRecord) -> bool:
     """Return whether an object stands on the furniture with nothing on or in it, so that it can be slid alone."""
     return thing.placed_as.supported_by is None and all(each.supported_by != thing.name for each in record.objects)
 
 
-def obstacles_of(thing: Thing, things: Sequence[Thing], record: SceneRecord) -> dict[str, PlacedParts]:
+def obstacles_of(thing: PosedObject, things: Sequence[PosedObject], record: SceneRecord) -> dict[str, PlacedParts]:
     """Return the possible obstacles of an object by name: the other objects, and furniture that rises above its foot."""
-    foot = thing.placed.bounds[0][2]
-    found = {other.name: other.placed for other in things if other is not thing}
+    foot = thing.placed_hulls.bounds[0][2]
+    found = {other.name: other.placed_hulls for other in things if other is not thing}
     for box in furniture_boxes(record.furniture):
         if box.box_to_world[2, 3] + box.half_extents_m[2] > foot + LEVEL_M / 2:
             found[box.name] = ConvexParts.of_box(box).at(box.box_to_world)
@@ -86,7 +86,7 @@ def obstacles_of(thing: Thing, things: Sequence[Thing], record: SceneRecord) -> 
 class Slide:
     """A horizontal slide of an object along a unit direction, from its place moved by ``start_m (x, y)``; nothing else moves."""
 
-    thing: Thing
+    thing: PosedObject
     start_m: tuple[float, float]
     direction: tuple[float, float]
 
@@ -96,14 +96,14 @@ class Slide:
         return np.array([*self.direction, 0.0])
 
     @property
-    def moved(self) -> np.ndarray:
+    def start_offset_m(self) -> np.ndarray:
         """The offset ``(3,)`` of the start from the object's place, m."""
         return np.array([*self.start_m, 0.0])
 
 
 def sweep(
-    slides: Sequence[Slide], things: Sequence[Thing], record: SceneRecord, length_m: float = LONGEST_M
-) -> list[Way]:
+    slides: Sequence[Slide], things: Sequence[PosedObject], record: SceneRecord, length_m: float = LONGEST_M
+) -> list[SweptPath]:
     """Return what each slide meets among all ``things`` of the scene.
 
     Convex parts are tested against those of obstacles whose boxes meet the swept box, by ray casts against their Minkowski
@@ -113,15 +113,15 @@ def sweep(
     groups = [
         (place, name, pairs)
         for place, slide in enumerate(slides)
-        for name, pairs in _on_the_way(slide, obstacles[slide.thing.name], length_m)
+        for name, pairs in _candidate_pairs(slide, obstacles[slide.thing.name], length_m)
     ]
-    meetings: list[dict[str, Meeting]] = [{} for _ in slides]
+    meetings: list[dict[str, ObstacleContact]] = [{} for _ in slides]
     for (place, name, _), met in zip(groups, _meetings([pairs for *_, pairs in groups], length_m), strict=True):
         slide = slides[place]
         if not _is_deep(slide, obstacles[slide.thing.name][name], met):
-            met = Meeting(met.near_m, np.inf)
+            met = ObstacleContact(met.near_m, np.inf)
         meetings[place][name] = met
-    return [Way(met, _leaves(slide, record)) for met, slide in zip(meetings, slides, strict=True)]
+    return [SweptPath(met, _leaves(slide, record)) for met, slide in zip(meetings, slides, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -137,9 +137,11 @@ class _Pairs:
     gap_m: np.ndarray
 
 
-def _on_the_way(slide: Slide, obstacles: Mapping[str, PlacedParts], length_m: float) -> Iterator[tuple[str, _Pairs]]:
+def _candidate_pairs(
+    slide: Slide, obstacles: Mapping[str, PlacedParts], length_m: float
+) -> Iterator[tuple[str, _Pairs]]:
     """Yield by obstacle the pairs of parts that may come within the margin, from boxes aligned with the direction."""
-    parts = slide.thing.placed.parts + slide.moved
+    parts = slide.thing.placed_hulls.parts + slide.start_offset_m
     way = slide.unit * length_m
     swept_low = np.minimum(parts.min((0, 1)), (parts + way).min((0, 1))) - MARGIN_M
     swept_high = np.maximum(parts.max((0, 1)), (parts + way).max((0, 1))) + MARGIN_M
@@ -159,7 +161,7 @@ def _on_the_way(slide: Slide, obstacles: Mapping[str, PlacedParts], length_m: fl
             yield name, _Pairs(parts[rows], obstacle.parts[columns], slide.unit, gap_m)
 
 
-def _meetings(groups: Sequence[_Pairs], length_m: float) -> list[Meeting]:
+def _meetings(groups: Sequence[_Pairs], length_m: float) -> list[ObstacleContact]:
     """Return for each group of pairs the first distance within the margin, and the first contact."""
     if not groups:
         return []
@@ -169,15 +171,15 @@ def _meetings(groups: Sequence[_Pairs], length_m: float) -> list[Meeting]:
     gap_m = np.concatenate([each.gap_m for each in groups])
     near_m, at_least_m = least_contacts(first, second, units, group, gap_m, length_m, MARGIN_M)
     touch_m, _ = least_contacts(first, second, units, group, at_least_m, length_m, TOUCH_M)
-    return [Meeting(float(near), float(touch)) for near, touch in zip(near_m, touch_m, strict=True)]
+    return [ObstacleContact(float(near), float(touch)) for near, touch in zip(near_m, touch_m, strict=True)]
 
 
-def _is_deep(slide: Slide, obstacle: PlacedParts, met: Meeting) -> bool:
+def _is_deep(slide: Slide, obstacle: PlacedParts, met: ObstacleContact) -> bool:
     """Return whether an object penetrates an obstacle deeply shortly after contact; otherwise it may only graze it."""
     if not np.isfinite(met.touch_m):
         return False
     pose = slide.thing.pose.copy()
-    pose[:3, 3] += slide.moved + (met.touch_m + FURTHER_M) * slide.unit
+    pose[:3, 3] += slide.start_offset_m + (met.touch_m + FURTHER_M) * slide.unit
     return overlap_depth(slide.thing.shape.hulls.at(pose), obstacle) >= DEEP_M
 
 
@@ -191,8 +193,8 @@ def _padded(groups: Sequence[np.ndarray]) -> np.ndarray:
 
 def _leaves(slide: Slide, record: SceneRecord) -> float:
     """Return how far the centre of an object moves before the furniture below it ends."""
-    middle = (slide.thing.center_m + slide.moved)[:2]
-    foot = slide.thing.placed.bounds[0][2]
+    middle = (slide.thing.center_m + slide.start_offset_m)[:2]
+    foot = slide.thing.placed_hulls.bounds[0][2]
     unit = slide.unit
     ends = [0.0]
     for box in record.furniture.boxes:

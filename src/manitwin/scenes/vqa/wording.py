@@ -73,7 +73,7 @@ CONVENTIONS: Mapping[str, Convention] = {
 
 
 @dataclass(frozen=True)
-class Worded:
+class WordedQuestion:
     """A worded question: ``prompt`` with options and answer format, ``answer`` short, ``response`` a sentence."""
 
     question: str
@@ -83,7 +83,7 @@ class Worded:
     options: tuple[str, ...]
 
 
-def worded(question: Question, convention: str, width_px: int, height_px: int) -> Worded:
+def word_question(question: Question, convention: str, width_px: int, height_px: int) -> WordedQuestion:
     """Write the places of a question in a convention."""
     rules = CONVENTIONS[convention]
 
@@ -100,7 +100,9 @@ def worded(question: Question, convention: str, width_px: int, height_px: int) -
     behind = {
         YES_NO: "Answer yes or no.", CHOICE: f"Choose one: {'; '.join(options)}.", POINT: rules.ask_point, BOX: rules.ask_box
     }.get(question.kind, "")  # fmt: skip
-    return Worded(asked, f"{asked} {behind}".strip(), written(question.answer), written(question.response), options)
+    return WordedQuestion(
+        asked, f"{asked} {behind}".strip(), written(question.answer), written(question.response), options
+    )
 
 
 _PLAIN = {"robopoint": "unit", "roborefer": "unit"}

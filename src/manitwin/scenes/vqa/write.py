@@ -11,7 +11,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError, unknown_name_message
 from manitwin.formats.output_folder import new_folder
 from manitwin.models.vlm.chat_from_spec import NO_CHAT, chat_of
 from manitwin.scenes.perception.output import JPEG_QUALITY, Output
@@ -20,10 +20,10 @@ from manitwin.scenes.perception.segmentation import VALIDATION_SHARE
 from manitwin.scenes.scene_files import dataset_of, scene_files
 from manitwin.scenes.vqa.formats import FORMATS, Pictures
 from manitwin.scenes.vqa.generate import drafts_of, questions_of
+from manitwin.scenes.vqa.posed_objects import TwinShape
 from manitwin.scenes.vqa.question import Draft, Question
 from manitwin.scenes.vqa.rephrasing import Rephrasing, kept_wordings, rephrasings, rephrasings_json
 from manitwin.scenes.vqa.report import vqa_page
-from manitwin.scenes.vqa.things import Shape
 from manitwin.scenes.vqa.wording import CONVENTIONS
 from manitwin.twin.loaded_twin import TwinSource
 
@@ -35,7 +35,7 @@ _PICTURES_KEPT = 8
 
 
 @dataclass(frozen=True)
-class Asked:
+class VqaCounts:
     """The counts of a data set of questions."""
 
     scenes: int
@@ -46,7 +46,7 @@ class Asked:
     rephrased: int
 
 
-def ask_scenes(
+def generate_questions(
     files: Sequence[Path],
     *,
     dataset: str | Path | None = None,
@@ -60,11 +60,11 @@ def ask_scenes(
     ``wordings_for`` returns more wordings of families.
     """
     source = TwinSource(dataset if dataset is not None else dataset_of(files[0]))
-    shapes: dict[str, Shape] = {}
+    shapes: dict[str, TwinShape] = {}
 
-    def shape_of(twin_id: str) -> Shape:
+    def shape_of(twin_id: str) -> TwinShape:
         if twin_id not in shapes:
-            shapes[twin_id] = Shape.of_twin(source.folder(twin_id))
+            shapes[twin_id] = TwinShape.of_twin(source.folder(twin_id))
         return shapes[twin_id]
 
     categories = sorted({thing.category for file in files for thing in read_scene_truth(file).record.objects})
@@ -94,7 +94,7 @@ def write_vqa(
     validation_share: float = VALIDATION_SHARE,
     seed: int = 7,
     vlm: str = NO_CHAT,
-) -> Asked:
+) -> VqaCounts:
     """Write questions about rendered scenes with computed answers, atomically.
 
     ``scenes`` is the output of ``manitwin layout --pictures``, or one scene of it. ``dataset`` is the folder of its twins, by
@@ -104,9 +104,9 @@ def write_vqa(
     an unknown format or convention, scenes without pictures or without any question, or an ``out`` that is not empty.
     """
     if form not in FORMATS:
-        raise UsageError(choose_from("format", form, FORMATS))
+        raise UsageError(unknown_name_message("format", form, FORMATS))
     if points not in CONVENTIONS:
-        raise UsageError(choose_from("convention of points", points, CONVENTIONS))
+        raise UsageError(unknown_name_message("convention of points", points, CONVENTIONS))
     if not 0 <= validation_share <= 1:
         raise UsageError(f"a validation share of {validation_share:g}; give 0 to 1")
     if per_scene < 1:
@@ -123,7 +123,7 @@ def write_vqa(
         return kept_wordings(given)
 
     with new_folder(Path(out)) as folder:
-        questions, pictures = ask_scenes(
+        questions, pictures = generate_questions(
             files,
             dataset=dataset,
             per_scene=per_scene,
@@ -148,7 +148,7 @@ def write_vqa(
         count = written.written
     families = len({each.family for each in questions})
     rephrased = sum(each.rephrased for each in questions)
-    return Asked(len(files), len({each.picture for each in questions}), len(questions), families, count, rephrased)
+    return VqaCounts(len(files), len({each.picture for each in questions}), len(questions), families, count, rephrased)
 
 
 def _jpegs(pictures: Mapping[str, PictureTruth]) -> Callable[[str], bytes]:

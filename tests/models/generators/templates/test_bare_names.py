@@ -6,7 +6,7 @@ import pytest
 from told_templates import TEMPLATES, made_of, read, whole
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.prior_names import lookup, named, named_together
+from manitwin.models.annotators.prior_names import find_prior, named, prior_by_compound
 
 
 @pytest.mark.parametrize(
@@ -52,8 +52,8 @@ def test_bare_names_are_no_names_of_other_things() -> None:
 
 def test_name_written_as_one_word_is_the_same() -> None:
     assert read("a brass doorknob").category == "door knob" == read("a brass door knob").category
-    found = named_together("doorknobs")
-    assert found is not None and found is lookup("door knob") and named_together("door") is None
+    found = prior_by_compound("doorknobs")
+    assert found is not None and found is find_prior("door knob") and prior_by_compound("door") is None
 
 
 def test_ice_cube_tray_is_no_tray_to_serve_on() -> None:

@@ -7,13 +7,13 @@ import pytest
 import trimesh
 from told_templates import TEMPLATES, made_of
 
-from manitwin.models.generators.templates.known import mass_properties
-from manitwin.models.generators.templates.made import Made
+from manitwin.models.generators.templates.ground_truth import mass_properties
+from manitwin.models.generators.templates.template_object import TemplateObject
 
 GROUPS = sorted({each.group for each in TEMPLATES.values()})
 
 
-def _border(made: Made, one: str, other: str) -> np.ndarray:
+def _border(made: TemplateObject, one: str, other: str) -> np.ndarray:
     mesh = made.mesh
     first, second = (np.unique(mesh.faces[mesh.faces_of(name)]) for name in (one, other))
     return mesh.vertices[np.intersect1d(first, second)]
@@ -55,7 +55,7 @@ def test_every_part_of_a_template_can_end_at_edges(group: str) -> None:
     for category, template in TEMPLATES.items():
         if template.group != group:
             continue
-        assembly = template.build(**template.typical()).assembly
+        assembly = template.build(**template.typical_measures()).assembly
         if not assembly.regions():
             continue
         with_regions += 1

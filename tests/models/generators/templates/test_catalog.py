@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.description_parser import ObjectDescription
 from manitwin.models.generators.templates.looks import look_of
-from manitwin.models.generators.templates.made import Made, visual_parts
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.template import IN_THE_OPEN
-from manitwin.models.generators.templates.text import Wanted
+from manitwin.models.generators.templates.object_sampling import make_object
+from manitwin.models.generators.templates.template import OFF_SURFACE_KINDS
+from manitwin.models.generators.templates.template_object import TemplateObject, visual_parts
 
 TEMPLATES = load_templates()
 SEEDS = (0, 11)
@@ -26,12 +26,12 @@ MASS_MARGIN, SIZE_MARGIN = 3.0, 1.25
 """Priors' intervals hold 19 of 20 such things: a template that draws its materials may be a little beyond."""
 
 
-def made(category: str, seed: int) -> Made:
-    return make(TEMPLATES[category], Wanted(category), np.random.default_rng(seed))
+def made(category: str, seed: int) -> TemplateObject:
+    return make_object(TEMPLATES[category], ObjectDescription(category), np.random.default_rng(seed))
 
 
 @cache
-def first_made(category: str) -> Made:
+def first_made(category: str) -> TemplateObject:
     return made(category, SEEDS[0])
 
 
@@ -48,7 +48,7 @@ def test_there_are_templates_of_the_six_groups_of_the_paper() -> None:
     [name if k % 3 == 0 else pytest.param(name, marks=pytest.mark.slow) for k, name in enumerate(TEMPLATES)],
 )
 def test_template_is_one_solid_of_its_parts_with_its_points_on_them(category: str) -> None:
-    prior = lookup(category)
+    prior = find_prior(category)
     assert prior is not None and prior.category == category
     for seed in SEEDS:
         thing = first_made(category) if seed == SEEDS[0] else made(category, seed)
@@ -63,7 +63,7 @@ def test_template_is_one_solid_of_its_parts_with_its_points_on_them(category: st
         assert thing.points, "something about it is known"
         for point in thing.points:
             assert np.linalg.norm(point.direction) == pytest.approx(1.0, abs=0.05)
-            if point.kind in IN_THE_OPEN:
+            if point.kind in OFF_SURFACE_KINDS:
                 continue
             triangles = surface.triangles[thing.mesh.faces_of(point.part)]
             nearest = trimesh.triangles.closest_point(triangles, np.repeat([point.position_m], len(triangles), 0))
@@ -75,7 +75,7 @@ def test_template_is_one_solid_of_its_parts_with_its_points_on_them(category: st
 def test_names_and_looks_of_a_template_mean_it(category: str) -> None:
     template = TEMPLATES[category]
     for name in template.names:
-        prior = lookup(name)
+        prior = find_prior(name)
         assert prior is not None and category in (prior.category, prior.kin_of), name  # it, or of its shape
     for looks in template.slots.values():
         assert all(words == "" or look_of(words).density_kg_m3 > 0 for words in looks)

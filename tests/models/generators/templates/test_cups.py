@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from manitwin.models.generators.templates.capacity import capacity_m3
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.catalog.cup_shapes import CupSide
-from manitwin.models.generators.templates.fitting.fit import made_of
+from manitwin.models.generators.templates.fitting.fit import build_fitted_object
 from manitwin.models.generators.templates.template import Model
 
 CUPS = ("tea cup", "cup and saucer")
@@ -20,7 +20,7 @@ WALL_M = 0.003
 
 def built(category: str, **measures: float) -> tuple[Model, dict[str, float]]:
     template = load_templates()[category]
-    wanted = template.typical() | measures
+    wanted = template.typical_measures() | measures
     return template.build(**wanted), wanted
 
 
@@ -101,8 +101,8 @@ def test_a_question_mark_reaches_farthest_above_the_middle_of_the_ear() -> None:
 @pytest.mark.parametrize("measures", [{}, {"flare": 0.14, "belly": 0.95}, {"bottom": 0.62, "rim": 0.9}])
 def test_a_cup_holds_what_is_within_its_walls(measures: dict[str, float]) -> None:
     template = load_templates()["tea cup"]
-    wanted = template.typical() | measures
-    thing = made_of(template, wanted)
+    wanted = template.typical_measures() | measures
+    thing = build_fitted_object(template, wanted)
     height, radius = wanted["rim"] * wanted["width_m"], 0.5 * wanted["width_m"]
     ratios = [wanted[name] for name in ("belly", "bottom", "taper", "flare")]
     lengths = np.array(ratios) * [radius, height, radius, radius]

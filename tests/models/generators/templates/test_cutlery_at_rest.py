@@ -10,11 +10,11 @@ from manitwin.geometry.hulls.reduction import convex_corners
 from manitwin.geometry.solids.shapes import box
 from manitwin.geometry.stable_poses import easiest_tilt, stable_poses
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.known import mass_properties
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.resting import rested, resting_pitch_rad
+from manitwin.models.generators.templates.description_parser import ObjectDescription
+from manitwin.models.generators.templates.ground_truth import mass_properties
+from manitwin.models.generators.templates.object_sampling import make_object
+from manitwin.models.generators.templates.resting import pitch_to_rest, resting_pitch_rad
 from manitwin.models.generators.templates.template import Model
-from manitwin.models.generators.templates.text import Wanted
 
 
 def bar_with_a_foot(at_m: float) -> Model:
@@ -29,7 +29,7 @@ def test_a_bar_with_a_foot_at_its_end_tips_until_its_other_end_is_down() -> None
     model = bar_with_a_foot(0.09)
     pitch_rad = resting_pitch_rad(model.assembly.triangles_m())
     assert pitch_rad == pytest.approx(np.arctan2(-0.02, 0.18))  # from the bar's end to the foot's inner edge
-    lying = rested(model)
+    lying = pitch_to_rest(model)
     mesh = lying.assembly.mesh()
     down = mesh.vertices[mesh.vertices[:, 2] < 1e-6]
     assert mesh.vertices[:, 2].min() == pytest.approx(0.0, abs=1e-7) and np.ptp(down[:, 0]) > 0.17
@@ -51,7 +51,7 @@ def test_a_bar_whose_foot_is_below_its_middle_stays_level() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_cutlery_is_on_the_table_with_its_head_and_its_handle(category: str, head: str, seed: int) -> None:
     template = load_templates()[category]
-    mesh = template.build(**template.drawn(np.random.default_rng(seed))).assembly.mesh()
+    mesh = template.build(**template.sample_measures(np.random.default_rng(seed))).assembly.mesh()
     length_m = np.ptp(mesh.vertices[:, 0])
     names = {head, "neck", "edge"} & set(mesh.names)
     heads = mesh.vertices[np.unique(np.concatenate([mesh.faces[mesh.faces_of(name)].ravel() for name in names]))]
@@ -65,7 +65,7 @@ def test_the_handle_of_a_spatula_rises_at_its_neck_as_much_as_is_said() -> None:
     template = load_templates()["spatula"]
 
     def thickness(**measures: float) -> float:
-        mesh = template.build(**template.typical() | measures).assembly.mesh()
+        mesh = template.build(**template.typical_measures() | measures).assembly.mesh()
         return float(np.ptp(mesh.vertices[:, 2]))
 
     assert (
@@ -77,7 +77,7 @@ def test_the_handle_of_a_spatula_rises_at_its_neck_as_much_as_is_said() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_drawn_cutlery_lies_in_some_way_that_a_slight_tilt_does_not_turn_over(category: str, seed: int) -> None:
     template, settings = load_templates()[category], PlacementConfig()
-    thing = make(template, Wanted(category), np.random.default_rng(seed))
+    thing = make_object(template, ObjectDescription(category), np.random.default_rng(seed))
     _, center, _ = mass_properties(thing.solids)
     corners = convex_corners(thing.mesh.vertices)[0]
     poses = np.array([pose.rotation for pose in stable_poses(corners, center)[:60]])

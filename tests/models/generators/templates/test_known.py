@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from manitwin.geometry.solids.shapes import box, cylinder
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.known import known_of, mass_properties, material_words
-from manitwin.models.generators.templates.making import make
-from manitwin.models.generators.templates.text import read_text
+from manitwin.models.generators.templates.description_parser import read_text
+from manitwin.models.generators.templates.ground_truth import mass_properties, material_words, object_import_record
+from manitwin.models.generators.templates.object_sampling import make_object
 
 TEMPLATES = load_templates()
 
@@ -27,8 +27,8 @@ def test_two_boxes_of_two_densities_have_the_inertia_of_the_parallel_axis_theore
 
 def test_head_of_steel_draws_the_centre_of_a_hammer_to_it() -> None:
     wanted = read_text("hammer with a wooden handle", TEMPLATES)
-    thing = make(TEMPLATES["hammer"], wanted, np.random.default_rng(5))
-    known = known_of(thing, "hammer with a wooden handle")
+    thing = make_object(TEMPLATES["hammer"], wanted, np.random.default_rng(5))
+    known = object_import_record(thing, "hammer with a wooden handle")
     assert known.mass_kg == pytest.approx(sum(thing.masses_kg.values()), rel=1e-6)
     assert known.center_of_mass_m is not None
     along = np.array(known.center_of_mass_m)[0] / np.ptp(thing.mesh.vertices[:, 0])
@@ -51,7 +51,7 @@ def test_head_of_steel_draws_the_centre_of_a_hammer_to_it() -> None:
 )
 def test_a_thing_is_made_of_what_most_of_its_mass_and_surface_are(text: str, materials: set[str]) -> None:
     wanted = read_text(text, TEMPLATES)
-    thing = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+    thing = make_object(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
     assert set(material_words(thing).split(" and ")) == materials
 
 
@@ -64,8 +64,8 @@ def test_a_thing_is_made_of_what_most_of_its_mass_and_surface_are(text: str, mat
 )  # fmt: skip
 def test_a_thing_is_called_as_its_text_does(text: str, category: str) -> None:
     wanted = read_text(text, TEMPLATES)
-    known = known_of(make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0)), text)
-    assert known.called == category and known.source == f"template:{wanted.category}"
+    known = object_import_record(make_object(TEMPLATES[wanted.category], wanted, np.random.default_rng(0)), text)
+    assert known.prior_key == category and known.source == f"template:{wanted.category}"
 
 
 @pytest.mark.parametrize(
@@ -73,21 +73,23 @@ def test_a_thing_is_called_as_its_text_does(text: str, category: str) -> None:
 )
 def test_parts_of_sheet_weigh_less_than_their_volume_of_metal_and_as_much_of_other_matter(text: str, part: str) -> None:
     brass, plastic = (
-        make(TEMPLATES[text], read_text(f"{matter} {text} with a {matter} {part}", TEMPLATES), np.random.default_rng(3))
+        make_object(
+            TEMPLATES[text], read_text(f"{matter} {text} with a {matter} {part}", TEMPLATES), np.random.default_rng(3)
+        )
         for matter in ("brass", "plastic")
     )
     assert brass.masses_kg[part] < 0.6 * 8500 / 1050 * plastic.masses_kg[part], (
         "hollow: walls follow the matter besides"
     )
-    usual = lookup(text)
+    usual = find_prior(text)
     assert usual is not None and sum(brass.masses_kg.values()) < usual.mass_kg.high
     whole = sum(density * float(solid.volume()) for solid, density in brass.solids)
     assert sum(brass.masses_kg.values()) == pytest.approx(whole), "what the inertia is made of weighs as much"
 
 
 def test_point_of_an_opening_is_on_the_rim() -> None:
-    thing = make(TEMPLATES["bowl"], read_text("bowl", TEMPLATES), np.random.default_rng(1))
-    opening = known_of(thing, "bowl").functional_points[0]
+    thing = make_object(TEMPLATES["bowl"], read_text("bowl", TEMPLATES), np.random.default_rng(1))
+    opening = object_import_record(thing, "bowl").functional_points[0]
     height = thing.mesh.vertices[:, 2].max()
     assert opening.label == "opening" and opening.position_m[2] > 0.9 * height
     assert np.hypot(*opening.position_m[:2]) > 0.04
@@ -105,5 +107,5 @@ def test_a_dumbbell_under_rubber_is_of_iron_and_rubber() -> None:
         ("a dumbbell with blue rubber weights", {"iron", "rubber"}),
         ("an iron dumbbell", {"iron"}),
     ):
-        made = make(TEMPLATES["dumbbell"], read_text(text, TEMPLATES), np.random.default_rng(0))
+        made = make_object(TEMPLATES["dumbbell"], read_text(text, TEMPLATES), np.random.default_rng(0))
         assert set(material_words(made).split(" and ")) == materials

@@ -7,8 +7,8 @@ from told_templates import read
 
 from manitwin.errors import UsageError
 from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.description_parser import MAX_CHARACTERS, read_text
 from manitwin.models.generators.templates.looks import MATERIALS
-from manitwin.models.generators.templates.text import MAX_CHARACTERS, read_text
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ import pytest
 from told_templates import TEMPLATES, made_of, read, whole
 
 from manitwin.errors import UsageError
-from manitwin.models.generators.templates.described import Wish
+from manitwin.models.generators.templates.look_phrases import LookRequest
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS
-from manitwin.models.generators.templates.making import make
+from manitwin.models.generators.templates.object_sampling import make_object
 
 
 def test_parts_are_described_by_their_name() -> None:
@@ -20,13 +20,13 @@ def test_parts_are_described_by_their_name() -> None:
 
 def test_a_part_is_called_by_its_plural_where_that_is_its_name() -> None:
     wanted = read("a red toothbrush with white bristles")
-    made = make(TEMPLATES["toothbrush"], wanted, np.random.default_rng(0))
+    made = make_object(TEMPLATES["toothbrush"], wanted, np.random.default_rng(0))
     white = tuple(int(COLORS["white"][i : i + 2], 16) / 255 for i in (0, 2, 4))
     assert made.looks["bristles"].rgb == pytest.approx(white)
 
 
 def test_a_material_that_only_a_part_has_is_that_part_s() -> None:
-    made = make(TEMPLATES["hammer"], read("a wooden hammer"), np.random.default_rng(1))
+    made = make_object(TEMPLATES["hammer"], read("a wooden hammer"), np.random.default_rng(1))
     assert made.looks["handle"].material == "wood" and made.looks["head"].surface == "steel"
     assert whole("a wooden spatula").material == whole("a hammer made of wood").material == MATERIALS["wood"]
 
@@ -42,14 +42,14 @@ def test_a_material_that_only_a_part_has_is_that_part_s() -> None:
     ],
 )
 def test_every_part_behind_and_has_its_colour(text: str) -> None:
-    made = make(TEMPLATES["hammer"], read(text), np.random.default_rng(0))
+    made = make_object(TEMPLATES["hammer"], read(text), np.random.default_rng(0))
     red, black = (tuple(int(COLORS[c][i : i + 2], 16) / 255 for i in (0, 2, 4)) for c in ("red", "black"))
     assert made.looks["handle"].rgb == pytest.approx(red) and made.looks["head"].rgb == pytest.approx(black)
 
 
 def test_a_part_without_words_of_its_own_is_as_the_one_before() -> None:
     wishes = read("a teapot with a black handle and lid").wishes
-    assert wishes["handle"] == wishes["lid"] != Wish()
+    assert wishes["handle"] == wishes["lid"] != LookRequest()
 
 
 def test_parts_have_other_names() -> None:
@@ -62,7 +62,7 @@ def test_parts_have_other_names() -> None:
 )
 def test_lids_and_handles_of_metal_are_of_sheet(text: str, part: str, most_kg: float) -> None:
     wanted = read(text)
-    made = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+    made = make_object(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
     assert made.masses_kg[part] < most_kg
 
 
@@ -89,7 +89,7 @@ def test_a_colour_of_a_tool_is_its_handle_s() -> None:
         "red scissors",
     ):
         wanted = read(text)
-        assert wanted.wishes == {"handle": Wish(red)}, text
+        assert wanted.wishes == {"handle": LookRequest(red)}, text
     for text in ("a red frying pan", "a red screwdriver", "a red mug", "a red steel hammer", "a silver hammer"):
         assert "" in read(text).wishes, text
 

@@ -8,7 +8,7 @@ import trimesh
 from told_templates import TEMPLATES, made_of, read
 
 from manitwin.errors import UsageError
-from manitwin.models.generators.templates.making import make
+from manitwin.models.generators.templates.object_sampling import make_object
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_food_and_balls_have_the_stated_size_and_the_usual_mass(
     text: str, mass_kg: float | None, extent_m: float | None
 ) -> None:
     wanted = read(text)
-    thing = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+    thing = make_object(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
     assert mass_kg is None or sum(thing.masses_kg.values()) == pytest.approx(mass_kg, rel=0.05)
     assert extent_m is None or np.ptp(thing.mesh.vertices, axis=0).max() == pytest.approx(extent_m, rel=0.02)
 
@@ -106,7 +106,7 @@ def test_stated_size_is_the_size() -> None:
         ("ruler 30 cm long", 0, 0.30),
     ):
         wanted = read(text)
-        thing = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+        thing = make_object(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
         assert np.ptp(thing.mesh.vertices, axis=0)[axis] == pytest.approx(size_m, rel=1e-6)
 
 
@@ -114,7 +114,7 @@ def test_stated_size_is_the_size() -> None:
 def test_what_no_such_thing_has_is_refused(text: str) -> None:
     wanted = read(text)
     with pytest.raises(UsageError):
-        make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+        make_object(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(
@@ -130,16 +130,18 @@ def test_what_no_such_thing_has_is_refused(text: str) -> None:
 )
 def test_the_side_that_is_meant_is_one_that_gives_a_usual_size(text: str, side: int, size_m: float) -> None:
     wanted = read(text)
-    made = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+    made = make_object(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
     assert np.ptp(made.mesh.vertices, axis=0)[side] == pytest.approx(size_m, rel=1e-6)
 
 
 def test_a_length_of_a_pan_is_its_diameter_and_not_that_of_its_handle() -> None:
     for text, diameter_m in (("a 10-inch frying pan", 0.254), ("a 20 cm saucepan", 0.2), ("a 24 cm pot", 0.24)):
         wanted = read(text)
-        extents = np.ptp(make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0)).mesh.vertices, axis=0)
+        extents = np.ptp(
+            make_object(TEMPLATES[wanted.category], wanted, np.random.default_rng(0)).mesh.vertices, axis=0
+        )
         assert extents[1] == pytest.approx(diameter_m, rel=1e-3) and extents[0] > 1.3 * diameter_m, text
-    long = make(TEMPLATES["frying pan"], read("a frying pan, 45 cm long"), np.random.default_rng(0))
+    long = make_object(TEMPLATES["frying pan"], read("a frying pan, 45 cm long"), np.random.default_rng(0))
     assert np.ptp(long.mesh.vertices, axis=0).max() == pytest.approx(0.45, rel=1e-6)
 
 
@@ -157,7 +159,7 @@ def test_a_dash_is_no_sign(text: str) -> None:
 def test_a_thing_that_is_stated_small_has_walls_that_can_be_made() -> None:
     for text in ("a steel mug, 7 cm", "a steel bowl, 7 cm", "a tiny steel mug"):
         wanted = read(text)
-        made = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+        made = make_object(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
         assert made.measures["wall_m"] > 0.00079, text
         if wanted.lengths_m:
             assert np.ptp(made.mesh.vertices, axis=0).max() == pytest.approx(0.07, rel=1e-6), text

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from manitwin.models.generators.lift.made_text import made_as_read
+from manitwin.models.generators.lift.text_generation import make_from_text
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.described import Wish
-from manitwin.models.generators.templates.made import Made
-from manitwin.models.generators.templates.text import Wanted, read_text
+from manitwin.models.generators.templates.description_parser import ObjectDescription, read_text
+from manitwin.models.generators.templates.look_phrases import LookRequest
+from manitwin.models.generators.templates.template_object import TemplateObject
 
 TEMPLATES = load_templates()
 
 
-def read(text: str) -> Wanted:
+def read(text: str) -> ObjectDescription:
     """Return what a text asks for."""
     return read_text(text, TEMPLATES)
 
 
-def whole(text: str) -> Wish:
+def whole(text: str) -> LookRequest:
     """Return what a text asks for of the whole thing."""
-    return read(text).wishes.get("", Wish())
+    return read(text).wishes.get("", LookRequest())
 
 
-def made_of(text: str) -> Made:
+def made_of(text: str) -> TemplateObject:
     """Return what is made of a text, of the first seed."""
-    return made_as_read(text, 0)[0]
+    return make_from_text(text, 0)[0]

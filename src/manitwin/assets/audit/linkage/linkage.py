@@ -42,7 +42,7 @@ class MovingJoint:
     lower: float | None = None
     upper: float | None = None
 
-    def moved(self, by: float) -> np.ndarray:
+    def displacement(self, by: float) -> np.ndarray:
         """Return the transform ``(4, 4)`` that moves the child from its start pose by this many rad or m."""
         return axis_motion(self.point, self.axis, by, slides=self.kind in SLIDES)
 
@@ -69,11 +69,11 @@ class Linkage:
     overlaps: tuple[Overlap, ...] | None = None
     collide: bool = True
 
-    def held_by(self, part: int) -> list[MovingJoint]:
+    def joints_of_child(self, part: int) -> list[MovingJoint]:
         """Return the joints whose child is a part."""
         return [joint for joint in self.joints if joint.child == part]
 
-    def carried(self, joint: MovingJoint) -> list[int]:
+    def moved_parts(self, joint: MovingJoint) -> list[int]:
         """Return the parts that a joint moves: its child and all descendants."""
         carried = [joint.child]
         for part in carried:

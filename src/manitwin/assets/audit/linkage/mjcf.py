@@ -10,11 +10,11 @@ import numpy as np
 
 from manitwin.assets.asset_files import SHAPE_LIMITS, AssetFiles
 from manitwin.assets.audit.linkage.linkage import Linkage, MovingJoint, Overlap
-from manitwin.assets.audit.linkage.read import moving_joint, part_of, require_whole
+from manitwin.assets.audit.linkage.read import moving_joint, part_of, require_no_missing_mesh
 from manitwin.assets.read import only_file
 from manitwin.assets.readers.joint_elements import mjcf_joints
 from manitwin.assets.readers.mjcf_document import MjcfSource, open_mjcf
-from manitwin.assets.readers.mjcf_model import compiled
+from manitwin.assets.readers.mjcf_model import compile_mjcf
 from manitwin.assets.readers.mjcf_shapes import BodyShapes
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
@@ -34,8 +34,8 @@ def read(path: Path, root: Path | None = None) -> Linkage:
     file = only_file(path) if path.is_dir() else path
     files = AssetFiles(root or root_of(path), file.resolve().parent, SHAPE_LIMITS)
     source = open_mjcf(file, files)
-    result = compiled(source, files)
-    require_whole(files, file.name)
+    result = compile_mjcf(source, files)
+    require_no_missing_mesh(files, file.name)
     model, data = result.model, mujoco.MjData(result.model)
     starts = [found for qpos in _starts(source, model) if (found := _overlaps(source, model, data, qpos)) is not None]
     if not starts:
@@ -47,7 +47,9 @@ def read(path: Path, root: Path | None = None) -> Linkage:
     parts = tuple(
         part_of(
             _name(model, head),
-            shapes.of([(body, _pose(data, body)) for body in range(model.nbody) if model.body_weldid[body] == head])[1],
+            shapes.body_shapes(
+                [(body, _pose(data, body)) for body in range(model.nbody) if model.body_weldid[body] == head]
+            )[1],
         )
         for head in heads
     )
@@ -89,19 +91,19 @@ def _joints(source: MjcfSource, model: Any, data: Any, heads: list[int]) -> list
         parent = int(model.body_weldid[model.body_parentid[body]])
         pose = transform(np.eye(3), np.array(data.xanchor[index]))
         ends = (heads.index(parent), heads.index(int(model.body_weldid[body])))
-        kind = said.kind if _meet(source, model, parent, body) else "fixed"
+        kind = said.kind if _can_collide(source, model, parent, body) else "fixed"
         made = moving_joint(said.name, kind, ends, pose, np.array(data.xaxis[index]), (said.lower, said.upper))
-        found.append(_standing_at(made, float(model.qpos0[model.jnt_qposadr[index]])))
+        found.append(_joint_at(made, float(model.qpos0[model.jnt_qposadr[index]])))
     return found
 
 
-def _standing_at(joint: MovingJoint, start: float) -> MovingJoint:
+def _joint_at(joint: MovingJoint, start: float) -> MovingJoint:
     return MovingJoint(
         joint.name, joint.kind, joint.parent, joint.child, joint.point, joint.axis, start, joint.lower, joint.upper
     )
 
 
-def _meet(source: MjcfSource, model: Any, parent: int, child: int) -> bool:
+def _can_collide(source: MjcfSource, model: Any, parent: int, child: int) -> bool:
     """Return whether the file lets shapes of two parts collide, apart from the parent-child filter."""
     groups = [
         [b for b in range(model.nbody) if model.body_weldid[b] == model.body_weldid[head]] for head in (parent, child)

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 from manitwin.assets.audit.linkage.linkage import Linkage, Overlap
 
 
-def overlaps_of(linkage: Linkage) -> tuple[Overlap, ...]:
+def find_overlaps(linkage: Linkage) -> tuple[Overlap, ...]:
     """Return the initial overlaps of parts that are not connected by a joint; engines filter the contacts of connected ones.
 
     For MJCF they are those that MuJoCo found. Otherwise the depth is the penetration depth of the deepest pair of convex shapes

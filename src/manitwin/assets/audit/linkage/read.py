@@ -11,8 +11,8 @@ import numpy as np
 from manitwin.assets.asset import CollisionShape, Format
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.audit.convex_shapes import ConvexShapes
+from manitwin.assets.audit.engine_shapes import split_groups
 from manitwin.assets.audit.linkage.linkage import Linkage, MovingJoint, Part
-from manitwin.assets.audit.taken_by import divided
 from manitwin.errors import AssetError
 
 _READERS: dict[Format, str] = {"urdf": "urdf", "embodiedgen": "urdf", "sdf": "sdf", "mjcf": "mjcf"}
@@ -36,9 +36,9 @@ def read_linkage(path: Path, format: Format, root: Path | None = None) -> Linkag
     return linkage
 
 
-def require_whole(files: AssetFiles, name: str) -> None:
+def require_no_missing_mesh(files: AssetFiles, name: str) -> None:
     """Raise AssetError if a mesh is missing, because the remaining parts are not representative."""
-    if files.lacks_a_mesh:
+    if files.has_missing_mesh:
         raise AssetError(f"{name}: meshes of its parts are missing: {', '.join(files.missing[:3])}")
 
 
@@ -47,8 +47,8 @@ def part_of(name: str, shapes: Sequence[CollisionShape], *, convex_only: bool = 
 
     ``convex_only``: leave out concave meshes, for engines that collide with triangles.
     """
-    pieces = [piece for shape in shapes for piece in divided(shape, True)]
-    hulls = ConvexShapes.of([np.asarray(piece.vertices, float) for piece in pieces])
+    pieces = [piece for shape in shapes for piece in split_groups(shape, True)]
+    hulls = ConvexShapes.from_vertices([np.asarray(piece.vertices, float) for piece in pieces])
     kept = zip(hulls.kept, hulls.volumes_m3, strict=True)
     chosen = [index for index, volume in kept if not convex_only or _is_convex(pieces[index], float(volume))]
     return Part(name, tuple(np.asarray(pieces[index].vertices, float) for index in chosen))

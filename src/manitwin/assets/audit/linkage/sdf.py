@@ -9,7 +9,7 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset_files import SHAPE_LIMITS
 from manitwin.assets.audit.linkage.linkage import Linkage, MovingJoint
-from manitwin.assets.audit.linkage.read import moving_joint, part_of, require_whole
+from manitwin.assets.audit.linkage.read import moving_joint, part_of, require_no_missing_mesh
 from manitwin.assets.readers.joint_elements import sdf_joints
 from manitwin.assets.readers.sdf import SdfModel, open_sdf
 from manitwin.assets.readers.sdf_shapes import MODEL_FRAME, SdfShapes
@@ -41,7 +41,7 @@ def read(path: Path, root: Path | None = None) -> Linkage | None:
         part_of(group[0], [shape for name in group for shape in shapes.collision(links[name])], convex_only=True)
         for group in names
     )
-    require_whole(opened.files, opened.file.name)
+    require_no_missing_mesh(opened.files, opened.file.name)
     said = [text_of(each, "self_collide") for each in (opened.model, *links.values())]
     return Linkage(parts, tuple(_joints(opened, parts_of)), collide=any((text or "").lower() in _TRUE for text in said))
 

@@ -33,7 +33,7 @@ LEAST_TRAVEL = 0.25
 
 
 @dataclass(frozen=True)
-class Swept:
+class JointSweep:
     """Effect of a joint on its child part, as shares of the surface of that part.
 
     ``crossing`` starts outside the parent part and passes through it. ``inside`` starts inside it, with ``least_inside`` and
@@ -47,28 +47,28 @@ class Swept:
     most_inside: float
 
     @property
-    def is_housed(self) -> bool:
+    def is_enclosed(self) -> bool:
         """Whether a nearly constant share stays inside over the joint range: a wheel in its fork, a shaft in its bearing."""
         return self.least_inside > _HOUSED and self.most_inside - self.least_inside < _STAYS
 
 
-def swept(linkage: Linkage) -> list[Swept]:
+def sweep_joints(linkage: Linkage) -> list[JointSweep]:
     """Move every revolute or prismatic joint from its start to both limits, with the others fixed."""
     return [
         found
         for joint in linkage.joints
         if joint.kind in TURNS + SLIDES
-        and (found := _swept(joint, linkage.parts[joint.parent], linkage.parts[joint.child])) is not None
+        and (found := _sweep_joint(joint, linkage.parts[joint.parent], linkage.parts[joint.child])) is not None
     ]
 
 
-def _swept(joint: MovingJoint, holder: Part, moved: Part) -> Swept | None:
+def _sweep_joint(joint: MovingJoint, holder: Part, moved: Part) -> JointSweep | None:
     ends = _ends(joint)
     if not ends or not holder.shapes or not moved.shapes:
         return None
     points = _surface_points(moved.shapes)
     longest_m = float(np.ptp(np.concatenate(moved.shapes), axis=0).max())
-    shapes = ConvexShapes.of(holder.shapes)
+    shapes = ConvexShapes.from_vertices(holder.shapes)
     within = _shrunk(shapes, min(GRAZES_M, 0.01 * longest_m))
     inside = within.depth_outside(points) <= 0
     crosses = np.zeros(len(points), bool)
@@ -76,13 +76,13 @@ def _swept(joint: MovingJoint, holder: Part, moved: Part) -> Swept | None:
     for end in ends:
         path = [points]
         for by in _positions(joint, end):
-            path.append(transform_points(joint.moved(by), points))
+            path.append(transform_points(joint.displacement(by), points))
             shares.append(float((within.depth_outside(path[-1]) <= 0).mean()))
         travel_m = max(travel_m, max(float(np.linalg.norm(at - points, axis=1).max()) for at in path))
         crosses |= _crossing(within, path)
     if travel_m < LEAST_TRAVEL * longest_m:
         return None
-    return Swept(joint, float((crosses & ~inside).mean()), shares[0], min(shares), max(shares))
+    return JointSweep(joint, float((crosses & ~inside).mean()), shares[0], min(shares), max(shares))
 
 
 def _ends(joint: MovingJoint) -> list[float]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from manitwin.assets.asset_files import SHAPE_LIMITS
 from manitwin.assets.audit.linkage.linkage import Linkage, MovingJoint
-from manitwin.assets.audit.linkage.read import moving_joint, part_of, require_whole
+from manitwin.assets.audit.linkage.read import moving_joint, part_of, require_no_missing_mesh
 from manitwin.assets.readers.joint_elements import urdf_joints
 from manitwin.assets.readers.upright import Y_UP_FORMATS
 from manitwin.assets.readers.urdf import open_urdf
@@ -23,7 +23,7 @@ def read(path: Path, root: Path | None = None) -> Linkage:
     """
     found = open_urdf(path, root, SHAPE_LIMITS)
     tree, links = found.tree, found.tree.links
-    poses, part_of_link, joints = _standing(tree)
+    poses, part_of_link, joints = _loading_pose(tree)
     names: list[list[str]] = [[] for _ in range(1 + max(part_of_link.values()))]
     for name, part in part_of_link.items():
         names[part].append(name)
@@ -33,11 +33,11 @@ def read(path: Path, root: Path | None = None) -> Linkage:
         part_of(group[0], [shape for name in group for shape in shapes.collision(links[name], poses[name])])
         for group in names
     )
-    require_whole(found.files, found.file.name)
+    require_no_missing_mesh(found.files, found.file.name)
     return Linkage(parts, tuple(joints))
 
 
-def _standing(tree: UrdfTree) -> tuple[dict[str, np.ndarray], dict[str, int], list[MovingJoint]]:
+def _loading_pose(tree: UrdfTree) -> tuple[dict[str, np.ndarray], dict[str, int], list[MovingJoint]]:
     """Return the pose ``(4, 4)`` of each link, parents first, the part index of each link, and the joints between parts."""
     declared = {joint.name: joint for joint in urdf_joints(tree)}
     hanging: dict[str, list[str]] = {}
@@ -61,5 +61,5 @@ def _standing(tree: UrdfTree) -> tuple[dict[str, np.ndarray], dict[str, int], li
             kind = "fixed" if said.follows is not None else said.kind  # another joint drives it
             moving = moving_joint(name, kind, (parts[link], parts[child]), pose, said.axis, (said.lower, said.upper))
             joints.append(moving)
-            poses[child] = moving.moved(moving.start) @ pose
+            poses[child] = moving.displacement(moving.start) @ pose
     return poses, parts, joints

@@ -54,7 +54,7 @@ def left_at_origin(measured: MeasuredAsset) -> Iterator[Complaint]:
     if measured.asset.inertial.mass_kg == 0:  # reported by MAS002
         return
     shapes = measured.shapes if len(measured.shapes) else measured.hull
-    expected = shapes.uniform.center_of_mass_m
+    expected = shapes.uniform_solid.center_of_mass_m
     away = float(np.linalg.norm(expected))
     at_the_surface = np.abs(expected) > np.maximum(SURFACE_SHARE * np.ptp(measured.hull.boxes, axis=(0, 1)), SLACK_M)
     if away > AWAY_SHARE * measured.longest_m or at_the_surface.any():

@@ -78,14 +78,14 @@ def box_differs(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def has_convex_pieces(measured: MeasuredAsset) -> bool:
     """Return whether the collision consists of convex pieces in the same box as the visual, so that both are comparable."""
-    if any(shape.as_drawn for shape in measured.asset.collision) or measured.once(_drawn):
+    if any(shape.as_drawn for shape in measured.asset.collision) or measured.measure_once(_concave_meshes):
         return False
     return bool(len(measured.shapes)) and not measured.complaints(box_differs) and not measured.complaints(not_convex)
 
 
 def filled_opening(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report a container that the collision shapes fill."""
-    air = measured.air
+    air = measured.free_space
     if measured.asset.static or air is None or air.opens is None or not has_convex_pieces(measured):
         return
     if measured.asset.partial:  # a link of a robot is hollow where the next one is mounted
@@ -93,7 +93,7 @@ def filled_opening(measured: MeasuredAsset) -> Iterator[Complaint]:
     across = np.ptp(air.points_m[air.hollow], axis=0)[np.abs(air.opens) < 0.5]
     if not len(across) or float(across.min()) < LEAST_OPENING_M:
         return
-    kept = 1 - float(measured.shapes.within(air.points_m[air.hollow]).mean())
+    kept = 1 - float(measured.shapes.is_within(air.points_m[air.hollow]).mean())
     if kept < LEAST_KEPT:
         yield Complaint(
             f"the collision shapes fill the opening: {kept:.0%} of its volume is kept, nothing can be put in",
@@ -103,12 +103,12 @@ def filled_opening(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def sticks_out(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report collision shapes that reach far into open air beside the object, except in hollows of containers."""
-    air = measured.air
+    air = measured.free_space
     if measured.asset.static or air is None or not has_convex_pieces(measured):
         return
     limit = max(STICKS_OUT_M, STICKS_OUT_SHARE * measured.longest_m)
     beside = air.points_m[~air.hollow]
-    inside = beside[measured.shapes.within(beside)]
+    inside = beside[measured.shapes.is_within(beside)]
     if not len(inside):
         return
     distance = measured.distance_m(inside, limit)
@@ -121,7 +121,7 @@ def sticks_out(measured: MeasuredAsset) -> Iterator[Complaint]:
         )
 
 
-def stands_for_object(measured: MeasuredAsset) -> bool:
+def has_graspable_collision(measured: MeasuredAsset) -> bool:
     """Return whether fingers would touch the collision shapes where they would touch the object."""
     return (
         has_convex_pieces(measured) and not measured.complaints(filled_opening) and not measured.complaints(sticks_out)
@@ -134,7 +134,7 @@ def uncovered(measured: MeasuredAsset) -> Iterator[Complaint]:
         return
     limit = max(UNCOVERED_M, UNCOVERED_SHARE * measured.longest_m)
     looked = measured.samples[::3]
-    bare = looked[~measured.shapes.within(looked, limit)]
+    bare = looked[~measured.shapes.is_within(looked, limit)]
     if len(bare):
         depth, share = float(measured.shapes.depth_outside(bare).max()), len(bare) / len(looked)
         yield Complaint(
@@ -146,9 +146,7 @@ def uncovered(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def not_convex(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report concave triangle meshes that are to be used unchanged."""
-    concave = [
-        shape for shape, volume in _with_hull_volume(measured) if not shape.convex and _is_concave(shape, volume)
-    ]
+    concave = [shape for shape, volume in _hull_volumes(measured) if not shape.convex and _is_concave(shape, volume)]
     if concave:
         names = ", ".join(shape.name for shape in concave[:4])
         yield Complaint(
@@ -158,7 +156,7 @@ def not_convex(measured: MeasuredAsset) -> Iterator[Complaint]:
         )
 
 
-def _with_hull_volume(measured: MeasuredAsset) -> Iterator[tuple[CollisionShape, float]]:
+def _hull_volumes(measured: MeasuredAsset) -> Iterator[tuple[CollisionShape, float]]:
     for index, volume in zip(measured.shapes.kept, measured.shapes.volumes_m3, strict=True):
         yield measured.asset.collision[index], float(volume)
 
@@ -169,11 +167,11 @@ def _is_concave(shape: CollisionShape, hull_volume_m3: float) -> bool:
     return abs(volume) < CONVEX_SHARE * hull_volume_m3
 
 
-def _drawn(measured: MeasuredAsset) -> list[CollisionShape]:
+def _concave_meshes(measured: MeasuredAsset) -> list[CollisionShape]:
     """Return the concave meshes that collide with their triangles."""
     if not measured.as_drawn:
         return []
-    volumes = _with_hull_volume(measured)
+    volumes = _hull_volumes(measured)
     return [shape for shape, volume in volumes if not shape.primitive and _is_concave(shape, volume)]
 
 
@@ -182,7 +180,7 @@ def costly(measured: MeasuredAsset) -> Iterator[Complaint]:
     shapes = measured.asset.collision
     if len(shapes) > MANY_SHAPES:
         yield Complaint(f"{len(shapes)} collision shapes: every contact becomes slow", values={"shapes": len(shapes)})
-    drawn = {id(shape) for shape in measured.once(_drawn)}
+    drawn = {id(shape) for shape in measured.measure_once(_concave_meshes)}
     corners = zip(measured.shapes.kept, measured.shapes.corners, strict=True)
     large = [
         (shapes[index], count)

@@ -13,8 +13,8 @@ from manitwin.assets.audit.complaint import Complaint
 from manitwin.assets.audit.convex_shapes import ConvexShapes
 from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
-from manitwin.assets.audit.rules.collision import stands_for_object
-from manitwin.assets.audit.rules.frames import is_sound
+from manitwin.assets.audit.rules.collision import has_graspable_collision
+from manitwin.assets.audit.rules.frames import is_rigid_transform
 from manitwin.assets.audit.rules.scale import is_of_wrong_size
 from manitwin.geometry.poses import transform_points
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
@@ -55,9 +55,11 @@ def default_gripper() -> Gripper:
     return load_gripper("panda")
 
 
-def contacts(measured: MeasuredAsset) -> Contacts | None:
+def measure_contacts(measured: MeasuredAsset) -> Contacts | None:
     """Measure the contact frames; None if there are none, or no geometry of plausible size to measure them against."""
-    frames = tuple(f for f in measured.asset.frames if f.kind == "contact" and is_sound(np.asarray(f.frame_to_asset)))
+    frames = tuple(
+        f for f in measured.asset.frames if f.kind == "contact" and is_rigid_transform(np.asarray(f.frame_to_asset))
+    )
     if not frames or not len(measured.samples) or is_of_wrong_size(measured):
         return None
     points = np.array([frame.frame_to_asset[:3, 3] for frame in frames], float)
@@ -65,8 +67,8 @@ def contacts(measured: MeasuredAsset) -> Contacts | None:
     below = heights < -max(BELOW_M, 0.02 * measured.longest_m)
     closings = Closings(np.ones(len(frames), bool), np.zeros(len(frames)))
     closing_frames = [i for i, f in enumerate(frames) if f.closing is not None and f.approach is not None]
-    if closing_frames and stands_for_object(measured):
-        found = close_on(
+    if closing_frames and has_graspable_collision(measured):
+        found = close_fingers(
             measured.shapes,
             points[closing_frames],
             np.array([frames[i].closing for i in closing_frames], float),
@@ -80,7 +82,7 @@ def contacts(measured: MeasuredAsset) -> Contacts | None:
 
 def distance_to_matter(measured: MeasuredAsset, points: np.ndarray, exact_beyond_m: float) -> np.ndarray:
     """Return the distances of points ``(N, 3)`` to the surface, 0 inside the object."""
-    outside = ~measured.shapes.within(points)
+    outside = ~measured.shapes.is_within(points)
     distance = np.zeros(len(points))
     if outside.any():
         distance[outside] = measured.distance_m(points[outside], exact_beyond_m)
@@ -89,7 +91,7 @@ def distance_to_matter(measured: MeasuredAsset, points: np.ndarray, exact_beyond
 
 def below_object(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report contact frames below the lowest point of the object."""
-    found = measured.once(contacts)
+    found = measured.measure_once(measure_contacts)
     if found is not None and found.below.any():
         deepest = float((measured.lowest_m - found.points_m @ measured.up).max())
         yield _complaint(found, found.below, f"up to {1000 * deepest:.3g} mm below the object's lowest point")
@@ -97,11 +99,11 @@ def below_object(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def out_of_reach(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report contact frames beside the object, where fingers close on nothing."""
-    found = measured.once(contacts)
+    found = measured.measure_once(measure_contacts)
     if found is None:
         return
     has_lines = np.array([f.closing is not None and f.approach is not None for f in found.frames])
-    has_lines &= stands_for_object(measured)
+    has_lines &= has_graspable_collision(measured)
     off = ~found.below & (found.distance_m > REACH_M) & ~(has_lines & found.closings.meets)
     if off.any():
         away = float(found.distance_m[off].max())
@@ -110,7 +112,7 @@ def out_of_reach(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def too_wide(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report contact frames at which the object is wider than the opening of the gripper."""
-    found = measured.once(contacts)
+    found = measured.measure_once(measure_contacts)
     if found is None:
         return
     gripper = default_gripper()
@@ -126,23 +128,23 @@ def too_wide(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def through_table(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report if every contact frame approaches from below at rest, so that the palm would be in the table."""
-    found = measured.once(contacts)
-    blocked, directed = measured.once(blocked_contacts)
+    found = measured.measure_once(measure_contacts)
+    blocked, directed = measured.measure_once(blocked_contacts)
     if found is not None and len(directed) and blocked.sum() == len(directed):
         yield _complaint(found, blocked, "the gripper comes from below, its palm would be in the table")
 
 
 def some_through_table(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Note contact frames that approach from below at rest, if others do not."""
-    found = measured.once(contacts)
-    blocked, directed = measured.once(blocked_contacts)
+    found = measured.measure_once(measure_contacts)
+    blocked, directed = measured.measure_once(blocked_contacts)
     if found is not None and 0 < blocked.sum() < len(directed):
         yield _complaint(found, blocked, f"from below at rest; {len(directed) - int(blocked.sum())} others are not")
 
 
 def blocked_contacts(measured: MeasuredAsset) -> tuple[np.ndarray, np.ndarray]:
     """Return which contact frames have their palm in the table ``(N,) bool``, and the indices of those with an approach."""
-    found = measured.once(contacts)
+    found = measured.measure_once(measure_contacts)
     if found is None:
         return np.zeros(0, dtype=bool), np.zeros(0, dtype=int)
     blocked = np.zeros(len(found.frames), dtype=bool)
@@ -157,7 +159,7 @@ def blocked_contacts(measured: MeasuredAsset) -> tuple[np.ndarray, np.ndarray]:
 def under_table(measured: MeasuredAsset, palms: np.ndarray) -> np.ndarray:
     """Return which palms ``(N, 3)`` are below the plane in every declared resting pose, or as the asset stands if it has none."""
     heights = [palms @ measured.up - measured.lowest_m]
-    rests = [rest for rest in measured.asset.rests if is_sound(np.asarray(rest, float))]
+    rests = [rest for rest in measured.asset.rests if is_rigid_transform(np.asarray(rest, float))]
     if rests:
         heights = [transform_points(np.asarray(rest, float), palms)[:, 2] for rest in rests]
     return np.max(heights, axis=0) < -BELOW_M
@@ -231,7 +233,7 @@ class Closings:
     least_opening_m: np.ndarray
 
 
-def close_on(
+def close_fingers(
     shapes: ConvexShapes, points: np.ndarray, closing: np.ndarray, approach: np.ndarray, opening_m: float
 ) -> Closings:
     """Close two fingers on shapes, about ``points (N, 3)`` between the fingertips along ``closing (N, 3)``.

@@ -23,7 +23,7 @@ AWAY_M, AWAY_SHARE = 0.03, 0.2
 
 
 @dataclass(frozen=True)
-class Frames:
+class FrameChecks:
     """Checks of all matrices of an asset (annotations, rests and grasps), each ``(N,)``.
 
     ``finite``: it is an affine transform of finite numbers. ``left_handed``: its axes are mirrored. ``off``: the largest entry
@@ -36,12 +36,12 @@ class Frames:
     off: np.ndarray
 
     @property
-    def sound(self) -> np.ndarray:
+    def is_rigid(self) -> np.ndarray:
         """The frames that are rigid transforms."""
         return self.finite & ~self.left_handed & (self.off <= NOT_ORTHONORMAL)
 
 
-def frames_of(matrices: Sequence[np.ndarray], names: Sequence[str] = ()) -> Frames:
+def check_frames(matrices: Sequence[np.ndarray], names: Sequence[str] = ()) -> FrameChecks:
     """Check matrices, which should be ``(4, 4)``."""
     poses = np.full((len(matrices), 4, 4), np.nan)
     for index, matrix in enumerate(matrices):
@@ -51,10 +51,10 @@ def frames_of(matrices: Sequence[np.ndarray], names: Sequence[str] = ()) -> Fram
         finite = np.isfinite(poses).all((1, 2)) & (np.abs(poses[:, 3] - [0, 0, 0, 1]).max(1, initial=0) < 1e-6)
     axes = np.where(finite[:, None, None], poses[:, :3, :3], np.eye(3))
     off = np.abs(np.swapaxes(axes, 1, 2) @ axes - np.eye(3)).max((1, 2), initial=0)
-    return Frames(tuple(names), finite, np.linalg.det(axes) < 0, off)
+    return FrameChecks(tuple(names), finite, np.linalg.det(axes) < 0, off)
 
 
-def all_frames(measured: MeasuredAsset) -> Frames:
+def all_frames(measured: MeasuredAsset) -> FrameChecks:
     """Check all matrices of an asset, with a readable name for each."""
     asset = measured.asset
     matrices = [frame.frame_to_asset for frame in asset.frames] + list(asset.rests)
@@ -63,36 +63,36 @@ def all_frames(measured: MeasuredAsset) -> Frames:
     for grasps in asset.grasps:
         matrices += list(grasps.gripper_to_asset)
         names += [f"{grasps.gripper} grasp {number}" for number in range(len(grasps.gripper_to_asset))]
-    return frames_of(matrices, names)
+    return check_frames(matrices, names)
 
 
-def is_sound(pose: np.ndarray) -> bool:
+def is_rigid_transform(pose: np.ndarray) -> bool:
     """Return whether a pose is a rigid transform."""
-    return bool(frames_of([pose]).sound[0])
+    return bool(check_frames([pose]).is_rigid[0])
 
 
 def not_finite(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report matrices that are not transforms."""
-    frames = measured.once(all_frames)
+    frames = measured.measure_once(all_frames)
     yield from _complain(_names(frames, ~frames.finite), "no 4x4 transform of finite numbers")
 
 
 def left_handed(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report mirrored frames."""
-    frames = measured.once(all_frames)
+    frames = measured.measure_once(all_frames)
     yield from _complain(_names(frames, frames.left_handed), "left-handed: the axes are mirrored")
 
 
 def not_orthonormal(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report axes that are not of unit length or not perpendicular."""
-    frames = measured.once(all_frames)
+    frames = measured.measure_once(all_frames)
     wrong = ~frames.left_handed & (frames.off > NOT_ORTHONORMAL)
     yield from _complain(
         _names(frames, wrong), f"axes are not unit and perpendicular, by up to {frames.off.max(initial=0):.2g}"
     )
 
 
-def _names(frames: Frames, which: np.ndarray) -> list[str]:
+def _names(frames: FrameChecks, which: np.ndarray) -> list[str]:
     return [frames.names[index] for index in np.flatnonzero(which)]
 
 
@@ -102,7 +102,7 @@ def duplicates(measured: MeasuredAsset) -> Iterator[Complaint]:
     twice = []
     for frame in measured.asset.frames:
         pose = np.asarray(frame.frame_to_asset, float)
-        if not frames_of([pose]).finite[0]:
+        if not check_frames([pose]).finite[0]:
             continue
         key = (frame.kind, (np.round(pose / SAME_POSE) + 0.0).tobytes())
         name = f"{frame.kind} {frame.number}"
@@ -115,7 +115,7 @@ def duplicates(measured: MeasuredAsset) -> Iterator[Complaint]:
 def far_from_object(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report functional and target frames far from the object."""
     frames = [frame for frame in measured.asset.frames if frame.kind in ("functional", "target")]
-    finite = frames_of([frame.frame_to_asset for frame in frames]).finite
+    finite = check_frames([frame.frame_to_asset for frame in frames]).finite
     frames = [frame for frame, is_finite in zip(frames, finite, strict=True) if is_finite]
     if not frames or not len(measured.samples):
         return
@@ -124,7 +124,7 @@ def far_from_object(measured: MeasuredAsset) -> Iterator[Complaint]:
     distance = measured.distance_m(points, limit)
     # a frame in the middle of a bowl or its opening is far from the wall, and correct
     if len(measured.hull):
-        distance = np.where(measured.hull.within(points, limit), 0.0, distance)
+        distance = np.where(measured.hull.is_within(points, limit), 0.0, distance)
     far = [f"{f.kind} {f.number}" for f, away in zip(frames, distance, strict=True) if away > limit]
     yield from _complain(far, f"up to {1000 * float(distance.max()):.3g} mm away from the object's surface")
 

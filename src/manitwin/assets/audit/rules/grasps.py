@@ -12,7 +12,7 @@ from manitwin.assets.audit.complaint import Complaint
 from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules.contacts import REACH_M, SLACK_M, distance_to_matter, under_table
-from manitwin.assets.audit.rules.frames import frames_of
+from manitwin.assets.audit.rules.frames import check_frames
 from manitwin.assets.audit.rules.scale import is_of_wrong_size
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
 
@@ -35,22 +35,22 @@ def none_held(measured: MeasuredAsset) -> Iterator[Complaint]:
         yield Complaint(f"none of the grasps held ({said})", values={"tried": tried})
 
 
-def held_sets(measured: MeasuredAsset) -> list[tuple[AnnotatedGrasps, np.ndarray, np.ndarray, Gripper | None]]:
+def sample_held_grasps(measured: MeasuredAsset) -> list[tuple[AnnotatedGrasps, np.ndarray, np.ndarray, Gripper | None]]:
     """Return, for each set, a sample of its valid held grasps: indices, points between the fingertips, and the gripper."""
     found = []
     for grasps in measured.asset.grasps:
         held = np.flatnonzero(np.asarray(grasps.held, bool))
         held = held[np.linspace(0, len(held) - 1, min(TRIED, len(held))).round().astype(int)]
         poses = np.asarray(grasps.gripper_to_asset, float)
-        held = held[frames_of(list(poses[held])).sound]
+        held = held[check_frames(list(poses[held])).is_rigid]
         if len(held):
             points = poses[held, :3, 3] + np.asarray(grasps.depth_m, float)[held, None] * poses[held, :3, 2]
-            found.append((grasps, held, points, _shipped(grasps.gripper)))
+            found.append((grasps, held, points, _bundled_gripper(grasps.gripper)))
     return found
 
 
 @cache
-def _shipped(gripper: str) -> Gripper | None:
+def _bundled_gripper(gripper: str) -> Gripper | None:
     return load_gripper(gripper) if gripper in shipped_grippers() else None
 
 
@@ -58,7 +58,7 @@ def grasps_off_object(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report sets of held grasps whose fingertips are away from the object."""
     if not len(measured.samples) or is_of_wrong_size(measured):
         return
-    for grasps, held, points, gripper in measured.once(held_sets):
+    for grasps, held, points, gripper in measured.measure_once(sample_held_grasps):
         reach = REACH_M if gripper is not None and gripper.kind != "multi_finger" else PALM_REACH_M
         poses, widths = np.asarray(grasps.gripper_to_asset, float)[held], np.asarray(grasps.width_m, float)[held]
         aside = poses[:, :3, 0] * np.nan_to_num(widths, posinf=0.0)[:, None] / 2
@@ -76,7 +76,7 @@ def grasps_off_object(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def grasps_too_wide(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report held grasps that are wider than the opening of their gripper."""
-    for grasps, held, _, gripper in measured.once(held_sets):
+    for grasps, held, _, gripper in measured.measure_once(sample_held_grasps):
         if gripper is None or gripper.kind != "parallel":
             continue
         widths = np.asarray(grasps.width_m, float)[held]
@@ -93,7 +93,7 @@ def all_through_table(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report sets of held grasps that all approach from below at rest."""
     if measured.bounds is None or is_of_wrong_size(measured):
         return
-    for grasps, held, _, _ in measured.once(held_sets):
+    for grasps, held, _, _ in measured.measure_once(sample_held_grasps):
         palms = np.asarray(grasps.gripper_to_asset, float)[held, :3, 3]
         if under_table(measured, palms).all():
             yield Complaint(

@@ -83,7 +83,7 @@ def placeholder(measured: MeasuredAsset) -> Iterator[Complaint]:
         yield Complaint(f"the inertia is the template's constant, 1.0 kg m2 about every axis{typical}")
 
 
-def triangle(measured: MeasuredAsset) -> Iterator[Complaint]:
+def violates_triangle(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report moments that violate the triangle inequality."""
     moments = _sound_moments(measured)
     if moments is not None and moments[2] > (moments[0] + moments[1]) * (1 + RELATIVE):
@@ -105,15 +105,15 @@ def plausible_moments(measured: MeasuredAsset) -> tuple[np.ndarray, np.ndarray] 
     bodies = [surface.shell.inertia_per_kg_m2]
     if surface.solid_inertia_per_kg_m2 is not None:
         bodies.append(surface.solid_inertia_per_kg_m2)
-    bodies += [shapes.uniform.inertia_per_kg_m2 for shapes in (measured.hull, measured.shapes) if len(shapes)]
-    leaning = leaning_inertia_per_kg_m2(measured.samples, measured.asset.inertial.center_of_mass_m)
+    bodies += [shapes.uniform_solid.inertia_per_kg_m2 for shapes in (measured.hull, measured.shapes) if len(shapes)]
+    leaning = skewed_inertia_per_kg_m2(measured.samples, measured.asset.inertial.center_of_mass_m)
     if leaning is not None:
         bodies.append(leaning)
     moments = mass * np.array([np.linalg.eigvalsh(body) for body in bodies])
     return moments.min(0), moments.max(0)
 
 
-def leaning_inertia_per_kg_m2(points: np.ndarray, center_m: np.ndarray | None) -> np.ndarray | None:
+def skewed_inertia_per_kg_m2(points: np.ndarray, center_m: np.ndarray | None) -> np.ndarray | None:
     """Return the inertia ``(3, 3)`` m^2, about ``center_m (3,)``, of unit mass on points ``(N, 3)``, as even as possible.
 
     It accounts for uneven mass: a hammer with a steel head and a wooden handle has a smaller inertia than one of a single
@@ -144,7 +144,7 @@ def magnitude(measured: MeasuredAsset) -> Iterator[Complaint]:
     moments, band = _sound_moments(measured), plausible_moments(measured)
     if moments is None or band is None or is_of_wrong_size(measured) or measured.asset.inertial.computed:
         return
-    if measured.complaints(triangle) or measured.complaints(placeholder):
+    if measured.complaints(violates_triangle) or measured.complaints(placeholder):
         return
     low, high = band[0] / FACTOR, band[1] * FACTOR
     if (moments < low).any() or (moments > high).any():
@@ -195,7 +195,7 @@ RULES = (
         why="For any body each principal moment is at most the sum of the two others. MuJoCo refuses to load what breaks it;"
         " others integrate it wrongly without a word.",
         remedy="Compute it from the shape; do not edit single entries of a tensor.",
-        check=triangle,
+        check=violates_triangle,
     ),
     Rule(
         "INE004",

@@ -28,7 +28,7 @@ MOST_NAMED = 3
 
 def no_axis(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report joints whose axis has no direction."""
-    yield from _of_joints(measured, _lacks_direction, lambda j: f"joint {j.name!r} has the axis {_three(j)}")
+    yield from _joints_complaint(measured, _lacks_direction, lambda j: f"joint {j.name!r} has the axis {_axis_text(j)}")
 
 
 def _lacks_direction(joint: DeclaredJoint) -> bool:
@@ -49,7 +49,9 @@ def axis_not_of_length_one(measured: MeasuredAsset) -> Iterator[Complaint]:
             return False
         return abs(_length(joint) - 1) > _NOT_OF_LENGTH_ONE
 
-    yield from _of_joints(measured, applies, lambda j: f"the axis of joint {j.name!r} has the length {_length(j):.4g}")
+    yield from _joints_complaint(
+        measured, applies, lambda j: f"the axis of joint {j.name!r} has the length {_length(j):.4g}"
+    )
 
 
 def limits_inverted(measured: MeasuredAsset) -> Iterator[Complaint]:
@@ -60,7 +62,7 @@ def limits_inverted(measured: MeasuredAsset) -> Iterator[Complaint]:
             return False
         return joint.kind in ABOUT_AN_AXIS and not joint.lower <= joint.upper
 
-    yield from _of_joints(
+    yield from _joints_complaint(
         measured, applies, lambda j: f"the limits of joint {j.name!r} are {j.lower:g} and {j.upper:g}"
     )
 
@@ -86,7 +88,7 @@ def limits_in_degrees(measured: MeasuredAsset) -> Iterator[Complaint]:
             return f"joint {joint.name!r} turns from {degrees}, which looks like radians"
         return f"joint {joint.name!r} turns from {lower:g} to {upper:g} rad, which looks like degrees"
 
-    yield from _of_joints(measured, applies, said)
+    yield from _joints_complaint(measured, applies, said)
 
 
 def _is_a_fraction(end: float) -> bool:
@@ -105,7 +107,7 @@ def limits_missing(measured: MeasuredAsset) -> Iterator[Complaint]:
     def applies(joint: DeclaredJoint) -> bool:
         return joint.kind in LIMITED and joint.lower is None
 
-    yield from _of_joints(measured, applies, lambda j: f"joint {j.name!r} is {j.kind} and has no <limit>")
+    yield from _joints_complaint(measured, applies, lambda j: f"joint {j.name!r} is {j.kind} and has no <limit>")
 
 
 def cannot_move(measured: MeasuredAsset) -> Iterator[Complaint]:
@@ -119,24 +121,24 @@ def cannot_move(measured: MeasuredAsset) -> Iterator[Complaint]:
             and joint.lower == joint.upper
         )
 
-    yield from _of_joints(
+    yield from _joints_complaint(
         measured, applies, lambda j: f"both limits of joint {j.name!r} are {j.lower:g}: it cannot move"
     )
 
 
-def follows_none(measured: MeasuredAsset) -> Iterator[Complaint]:
+def mimics_missing(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report joints that mimic a joint which does not exist."""
     names = {joint.name for joint in measured.asset.joints}
 
     def applies(joint: DeclaredJoint) -> bool:
         return joint.follows is not None and joint.follows not in names
 
-    yield from _of_joints(
+    yield from _joints_complaint(
         measured, applies, lambda j: f"joint {j.name!r} mimics {j.follows!r}, which the file does not have"
     )
 
 
-def _of_joints(
+def _joints_complaint(
     measured: MeasuredAsset, applies: Callable[[DeclaredJoint], bool], said: Callable[[DeclaredJoint], str]
 ) -> Iterator[Complaint]:
     """Report all joints for which ``applies`` is true in one complaint, with the text of ``said`` for the first few."""
@@ -147,7 +149,7 @@ def _of_joints(
         yield Complaint(f"{named}{more}", values={"joints": [joint.name for joint in found[:50]]})
 
 
-def _three(joint: DeclaredJoint) -> str:
+def _axis_text(joint: DeclaredJoint) -> str:
     return " ".join(f"{value:g}" for value in (joint.axis if joint.axis is not None else ()))
 
 
@@ -204,7 +206,7 @@ RULES = (
         "error",
         why="A joint that copies one which the file does not have is refused by some loaders, and moves freely in others.",
         remedy="Name a joint of the file.",
-        check=follows_none,
+        check=mimics_missing,
     ),
     Rule(
         "JNT007",

@@ -132,7 +132,7 @@ def against_category(measured: MeasuredAsset) -> Iterator[Complaint]:
         )
 
 
-def weighed_twice(measured: MeasuredAsset) -> Iterator[Complaint]:
+def counted_twice(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report a mass that the format's engine increases, because it counts overlapping shapes twice."""
     declared, engine = positive_mass_kg(measured), measured.asset.inertial.engine_kg
     if declared is not None and engine is not None:
@@ -191,6 +191,6 @@ RULES = (
         " a density and what is only seen none, each place counts twice. An apple of object_sim is declared with 0.41 kg and"
         " simulated with 0.74, a wine glass with 0.19 and 0.80.",
         remedy='Write mass="0" for the geoms that are only seen, or an <inertial> for the body.',
-        check=weighed_twice,
+        check=counted_twice,
     ),
 )

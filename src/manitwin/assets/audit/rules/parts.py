@@ -10,9 +10,9 @@ import numpy as np
 from manitwin.assets.audit.complaint import Complaint
 from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.linkage.linkage import Linkage
-from manitwin.assets.audit.linkage.overlaps import overlaps_of
+from manitwin.assets.audit.linkage.overlaps import find_overlaps
 from manitwin.assets.audit.linkage.read import read_linkage
-from manitwin.assets.audit.linkage.sweeps import Swept, swept
+from manitwin.assets.audit.linkage.sweeps import JointSweep, sweep_joints
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules.joints import limits_in_degrees
 from manitwin.errors import AssetError
@@ -32,44 +32,44 @@ _SELF_COLLIDING = ("mujoco", "sapien")
 
 
 @dataclass(frozen=True)
-class _Read:
+class _LinkageResult:
     linkage: Linkage | None
     why_not: str = ""
 
 
-def _linkage(measured: MeasuredAsset) -> _Read:
+def _linkage(measured: MeasuredAsset) -> _LinkageResult:
     asset = measured.asset
     if not measured.engines or asset.soft or not (asset.joints or asset.format == "mjcf"):
-        return _Read(None)
+        return _LinkageResult(None)
     try:
-        return _Read(read_linkage(asset.path, asset.format, measured.root))
+        return _LinkageResult(read_linkage(asset.path, asset.format, measured.root))
     except AssetError as error:
-        return _Read(None, " ".join(str(error).split())[:200])
+        return _LinkageResult(None, " ".join(str(error).split())[:200])
 
 
-def _all_swept(measured: MeasuredAsset) -> list[Swept]:
-    linkage = measured.once(_linkage).linkage
-    return [] if linkage is None else swept(linkage)
+def _all_sweeps(measured: MeasuredAsset) -> list[JointSweep]:
+    linkage = measured.measure_once(_linkage).linkage
+    return [] if linkage is None else sweep_joints(linkage)
 
 
-def parts_not_held_against_each_other(measured: MeasuredAsset) -> str:
+def linkage_error(measured: MeasuredAsset) -> str:
     """Return why the parts of the asset were not checked; empty if they were, or if there are none."""
-    return measured.once(_linkage).why_not
+    return measured.measure_once(_linkage).why_not
 
 
 def starts_overlapping(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report parts that overlap each other or the ground at loading."""
-    linkage = measured.once(_linkage).linkage
+    linkage = measured.measure_once(_linkage).linkage
     if linkage is None:
         return
     found = []
     if linkage.overlaps is not None or any(engine in _SELF_COLLIDING for engine in measured.engines):
         sizes = {part.name: _longest_m(part.shapes) for part in linkage.parts if part.shapes}
-        for each in overlaps_of(linkage):
+        for each in find_overlaps(linkage):
             least_m = min(sizes.get(name, np.inf) for name in (each.one, each.other))
             if each.depth_m > max(DEEP_M, DEEP_SHARE * (least_m if np.isfinite(least_m) else 0.0)):
                 found.append((each.depth_m, f"{each.one!r} lies {1000 * each.depth_m:.3g} mm in {_named(each.other)}"))
-    for entry in measured.once(_all_swept):
+    for entry in measured.measure_once(_all_sweeps):
         if _starts_inside(entry):
             joint = entry.joint
             moved, holder = linkage.parts[joint.child].name, linkage.parts[joint.parent].name
@@ -87,14 +87,14 @@ def starts_overlapping(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def passes_through(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report joints that drive a part through its parent."""
-    linkage = measured.once(_linkage).linkage
+    linkage = measured.measure_once(_linkage).linkage
     in_degrees = {name for said in measured.complaints(limits_in_degrees) for name in (said.values or {})["joints"]}
     found = [
         entry
-        for entry in measured.once(_all_swept)
+        for entry in measured.measure_once(_all_sweeps)
         if entry.joint.name not in in_degrees
         and entry.crossing >= PASSES_THROUGH
-        and not entry.is_housed
+        and not entry.is_enclosed
         and not _starts_inside(entry)
     ]
     if linkage is not None and found:
@@ -113,7 +113,7 @@ def passes_through(measured: MeasuredAsset) -> Iterator[Complaint]:
         )
 
 
-def _starts_inside(entry: Swept) -> bool:
+def _starts_inside(entry: JointSweep) -> bool:
     return entry.inside >= STARTS_INSIDE and entry.least_inside <= FREED * entry.inside
 
 

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 from manitwin.assets.audit.complaint import Complaint
 from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
-from manitwin.assets.audit.rules.frames import is_sound
+from manitwin.assets.audit.rules.frames import is_rigid_transform
 from manitwin.geometry.poses import transform_points
 
 SLACK_M, SLACK_SHARE = 0.002, 0.01
@@ -28,7 +28,9 @@ def rest_off_plane(measured: MeasuredAsset) -> Iterator[Complaint]:
     if measured.body is None:
         return
     off = {
-        number: low for number, points in _rested(measured) if abs(low := float(points[:, 2].min())) > _slack(measured)
+        number: low
+        for number, points in _declared_rests(measured)
+        if abs(low := float(points[:, 2].min())) > _slack(measured)
     }
     for number, low in off.items():
         where = "above" if low > 0 else "below"
@@ -55,7 +57,7 @@ def tips_over(measured: MeasuredAsset) -> Iterator[Complaint]:
     center = measured.asset.inertial.center_of_mass_m
     if center is None or not np.isfinite(center).all() or measured.body is None:
         return
-    for number, points in _rested(measured):
+    for number, points in _declared_rests(measured):
         low = float(points[:, 2].min())
         if abs(low) > _slack(measured):
             continue
@@ -69,13 +71,13 @@ def tips_over(measured: MeasuredAsset) -> Iterator[Complaint]:
             )
 
 
-def _rested(measured: MeasuredAsset) -> Iterator[tuple[int, np.ndarray]]:
+def _declared_rests(measured: MeasuredAsset) -> Iterator[tuple[int, np.ndarray]]:
     assert measured.body is not None
     hull = measured.hull
     corners = hull.triangles.reshape(-1, 3) if len(hull) else np.asarray(measured.body.vertices, float)
     for number, rest in enumerate(measured.asset.rests):
         pose = np.asarray(rest, float)
-        if is_sound(pose):
+        if is_rigid_transform(pose):
             yield number, transform_points(pose, corners)
 
 

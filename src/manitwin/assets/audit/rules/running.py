@@ -7,14 +7,14 @@ from itertools import chain, combinations, islice
 
 import numpy as np
 
-from manitwin.assets.audit.ball_runs import balls
+from manitwin.assets.audit.ball_runs import drop_balls
 from manitwin.assets.audit.complaint import Complaint
-from manitwin.assets.audit.engine_runs import Drops, Run, drops
+from manitwin.assets.audit.engine_runs import DropRun, DropRuns, run_drops
 from manitwin.assets.audit.finding import Rule
-from manitwin.assets.audit.joint_runs import with_joints_free
+from manitwin.assets.audit.joint_runs import run_free_joints
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules.collision import filled_opening, has_convex_pieces
-from manitwin.assets.audit.rules.parts import parts_not_held_against_each_other
+from manitwin.assets.audit.rules.parts import linkage_error
 
 SUNK_M, SUNK_SHARE = 0.003, 0.03
 """Tolerated depth below the plane or difference in height, in metres and as share of the longest side: exceeds soft contact."""
@@ -27,25 +27,25 @@ def not_run(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report that the asset could not be simulated."""
     if not measured.engines:
         return
-    dropped = measured.once(drops)
+    dropped = measured.measure_once(run_drops)
     if dropped.body is None:
         yield Complaint(f"not run in {', '.join(measured.engines)}: {dropped.why_not}")
-    why_not = parts_not_held_against_each_other(measured)
+    why_not = linkage_error(measured)
     if why_not:
         yield Complaint(f"its parts were not held against each other: {why_not}")
 
 
 def refused(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report engines that refuse the body, or whose simulation diverges."""
-    for run in _dropped(measured).runs:
+    for run in _drop_runs(measured).runs:
         if run.refused:
             yield Complaint(f"{run.engine} does not run it: {run.refused}", values=_values(run))
 
 
 def leaves_plane(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report a body that ends below the plane, or in the air."""
-    dropped = _dropped(measured)
-    for run in _ended(dropped):
+    dropped = _drop_runs(measured)
+    for run in _finished_runs(dropped):
         lowest_m = dropped.lowest_m(run)
         if abs(lowest_m) > _slack_m(measured):
             where = "below" if lowest_m < 0 else "above"
@@ -58,10 +58,10 @@ def leaves_plane(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def jitters(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report a body that neither moves away nor comes to rest; one that rolls away is ignored."""
-    dropped = _dropped(measured)
+    dropped = _drop_runs(measured)
     if measured.complaints(leaves_plane):
         return  # one finding for one cause
-    for run in _ended(dropped):
+    for run in _finished_runs(dropped):
         assert run.end is not None and dropped.start is not None
         moved_m = float(np.linalg.norm((run.end - dropped.start)[:2, 3]))
         if not run.at_rest and moved_m < measured.longest_m / 2:
@@ -74,25 +74,29 @@ def jitters(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def depends_on_step(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report a body that comes to rest differently at half the time step."""
-    dropped = _dropped(measured)
+    dropped = _drop_runs(measured)
     if measured.complaints(leaves_plane):
         return
-    for one, other in combinations(_ended(dropped), 2):
+    for one, other in combinations(_finished_runs(dropped), 2):
         if one.engine == other.engine:
-            yield from _differ(measured, dropped, one, other, f"at half the step of {one.engine}")
+            yield from _disagreements(measured, dropped, one, other, f"at half the step of {one.engine}")
 
 
 def engines_disagree(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Report a body that comes to rest differently in another engine."""
-    dropped = _dropped(measured)
+    dropped = _drop_runs(measured)
     if measured.complaints(leaves_plane) or measured.complaints(depends_on_step):
         return  # one finding for one cause
-    pairs = combinations(_one_each(dropped), 2)
-    found = (_differ(measured, dropped, one, other, f"in {other.engine} and in {one.engine}") for one, other in pairs)
+    pairs = combinations(_default_step_runs(dropped), 2)
+    found = (
+        _disagreements(measured, dropped, one, other, f"in {other.engine} and in {one.engine}") for one, other in pairs
+    )
     yield from islice(chain.from_iterable(found), 1)
 
 
-def _differ(measured: MeasuredAsset, dropped: Drops, one: Run, other: Run, where: str) -> Iterator[Complaint]:
+def _disagreements(
+    measured: MeasuredAsset, dropped: DropRuns, one: DropRun, other: DropRun, where: str
+) -> Iterator[Complaint]:
     if not (one.at_rest and other.at_rest):
         return
     assert one.end is not None and other.end is not None
@@ -109,8 +113,8 @@ def _differ(measured: MeasuredAsset, dropped: Drops, one: Run, other: Run, where
 
 def tips(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Note a body that tips over in every engine when put down in the pose of its file."""
-    dropped = _dropped(measured)
-    ended = _ended(dropped)
+    dropped = _drop_runs(measured)
+    ended = _finished_runs(dropped)
     if not ended or dropped.start is None or measured.complaints(leaves_plane):
         return
     start = dropped.start
@@ -130,7 +134,7 @@ def opening_closed(measured: MeasuredAsset) -> Iterator[Complaint]:
         return  # one finding for one cause
     if not has_convex_pieces(measured):
         return
-    found = measured.once(balls)
+    found = measured.measure_once(drop_balls)
     out = [engine for engine, inside in found.inside.items() if not inside]
     if out and found.opening is not None:
         radius_m = min(found.opening.rim_radius_m, found.opening.depth_m) / 3
@@ -145,7 +149,7 @@ def joints_do_not_hold(measured: MeasuredAsset) -> Iterator[Complaint]:
     record = measured.record
     if "mujoco" not in measured.engines or record is None or not record.joints or not record.placements:
         return
-    found = measured.once(with_joints_free)
+    found = measured.measure_once(run_free_joints)
     if found.refused:
         yield Complaint(f"mujoco does not run it with its joints free: {found.refused}")
     elif found.beyond:
@@ -160,24 +164,24 @@ def joints_do_not_hold(measured: MeasuredAsset) -> Iterator[Complaint]:
         )
 
 
-def _dropped(measured: MeasuredAsset) -> Drops:
-    return measured.once(drops) if measured.engines else Drops(None, None)
+def _drop_runs(measured: MeasuredAsset) -> DropRuns:
+    return measured.measure_once(run_drops) if measured.engines else DropRuns(None, None)
 
 
-def _ended(dropped: Drops) -> list[Run]:
+def _finished_runs(dropped: DropRuns) -> list[DropRun]:
     return [run for run in dropped.runs if run.end is not None]
 
 
-def _one_each(dropped: Drops) -> list[Run]:
+def _default_step_runs(dropped: DropRuns) -> list[DropRun]:
     """Return the run of each engine at its usual time step."""
-    return list({run.engine: run for run in reversed(_ended(dropped))}.values())[::-1]
+    return list({run.engine: run for run in reversed(_finished_runs(dropped))}.values())[::-1]
 
 
 def _slack_m(measured: MeasuredAsset) -> float:
     return max(SUNK_M, SUNK_SHARE * measured.longest_m)
 
 
-def _values(run: Run) -> dict[str, object]:
+def _values(run: DropRun) -> dict[str, object]:
     return {"engine": run.engine, "timestep_s": run.timestep_s}
 
 

@@ -99,7 +99,7 @@ def up_axis(measured: MeasuredAsset) -> Iterator[Complaint]:
     evidence = []
     if _stands(measured.bounds, other) and not _stands(measured.bounds, measured.up):
         evidence.append(f"it stands on the origin's plane along +{name}")
-    air = measured.air
+    air = measured.free_space
     if air is not None and air.opens is not None and float(air.opens @ other) > 0.5:
         evidence.append(f"its opening looks along +{name}")
     if evidence:

@@ -10,8 +10,8 @@ from manitwin.assets.audit.complaint import Complaint
 from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.errors import TwinError
-from manitwin.geometry.frames.on_feature import ON_FEATURE_M, off_feature_m
-from manitwin.geometry.frames.words import fits
+from manitwin.geometry.frames.feature_deviation import ON_FEATURE_M, feature_deviation_m
+from manitwin.geometry.frames.label_keywords import is_compatible_kind
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import NO_PART
@@ -114,7 +114,7 @@ def frames_off_feature(measured: MeasuredAsset) -> Iterator[Complaint]:
         return
     limit = max(ON_FEATURE_M, measured.spacing_m)
     off = {
-        point.id: off_feature_m(
+        point.id: feature_deviation_m(
             point.frame.kind,
             np.array(point.frame.position_m),
             rotation_from_quaternion_wxyz(np.array(point.frame.quaternion_wxyz)),
@@ -140,7 +140,7 @@ def frame_kinds(measured: MeasuredAsset) -> Iterator[Complaint]:
     odd = [
         f"{point.id} {point.label!r} as {point.frame.kind}"
         for point in measured.record.points.functional
-        if point.frame is not None and not fits(point.label, point.frame.kind)
+        if point.frame is not None and not is_compatible_kind(point.label, point.frame.kind)
     ]
     if odd:
         yield Complaint(

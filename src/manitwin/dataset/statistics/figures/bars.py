@@ -12,9 +12,9 @@ from manitwin.dataset.statistics.style import (
     GREY,
     RED,
     Figure,
-    beside_bar,
     count_axis,
-    finished,
+    export_figure,
+    label_bar,
     legend_above,
     plain_number,
     row_canvas,
@@ -35,7 +35,7 @@ def success_by_stage(result: Result) -> Figure | None:
     axis.barh(where, passed, color=BLUE, height=0.7, label="passed")
     axis.barh(where, rejected, left=passed, color=RED, height=0.7, label="rejected")
     for y, row in enumerate(rows):
-        beside_bar(axis, row["entered"], y, f"{100 * row['passed_share']:.1f} %")
+        label_bar(axis, row["entered"], y, f"{100 * row['passed_share']:.1f} %")
     axis.margins(x=0.12)
     count_axis(axis, "x", "items that entered the stage")
     legend_above(axis, 2, handlelength=1)
@@ -46,14 +46,14 @@ def success_by_stage(result: Result) -> Figure | None:
         + " ".join(f"{row['stage']}: {row['passed']} passed, {row['rejected']} rejected." for row in rows)
     )
     caption = "Items that entered each stage, passed and rejected, and the share that passed."
-    return finished(figure, "success_by_stage", caption, alt, result)
+    return export_figure(figure, "success_by_stage", caption, alt, result)
 
 
 def rejections(result: Result) -> Figure | None:
     """Draw the reasons of rejection, most frequent first."""
     rows = sorted(result.rows, key=lambda row: (-row["items"], row["stage"], row["reason"]))[:MOST_REASONS]
     values = {f"{row['stage']}: {row['reason'].replace('_', ' ')}": row["items"] for row in rows}
-    return _simple(result, "rejections", "Why items were rejected.", values, "rejected items", color=RED)
+    return _single_bars(result, "rejections", "Why items were rejected.", values, "rejected items", color=RED)
 
 
 def outcomes(result: Result) -> Figure | None:
@@ -72,7 +72,7 @@ def outcomes(result: Result) -> Figure | None:
     alt = "Bars of the outcomes of failed grasps. " + " ".join(
         f"{row['outcome']}: {row['filtered']} filtered, {row['unfiltered_sample']} unfiltered." for row in rows
     )
-    return finished(figure, "failed_outcomes", "How grasps fail, with and without the filters.", alt, result)
+    return export_figure(figure, "failed_outcomes", "How grasps fail, with and without the filters.", alt, result)
 
 
 def categories(result: Result) -> Figure | None:
@@ -81,17 +81,17 @@ def categories(result: Result) -> Figure | None:
     some = f"The {len(rows)} most frequent of {len(result.rows)} categories."
     caption = some if len(result.rows) > len(rows) else "Categories of accepted twins."
     values = {row["category"]: row["twins"] for row in rows}
-    return _simple(result, "categories", caption, values, "accepted twins", color=BLUE)
+    return _single_bars(result, "categories", caption, values, "accepted twins", color=BLUE)
 
 
 def cost(result: Result) -> Figure | None:
     """Draw the mean CPU time of every stage."""
     values = {row["stage"]: row["cpu_mean"] for row in result.rows if row["cpu_mean"] is not None}
     caption = "Mean CPU time of each stage, over the items that it ran on."
-    return _simple(result, "cost_by_stage", caption, values, "mean CPU time, s", color=BLUE, counts=False)
+    return _single_bars(result, "cost_by_stage", caption, values, "mean CPU time, s", color=BLUE, counts=False)
 
 
-def _simple(
+def _single_bars(
     result: Result,
     name: str,
     caption: str,
@@ -106,7 +106,7 @@ def _simple(
     figure, axis = row_canvas([shortened(each) for each in values])
     axis.barh(np.arange(len(values)), list(values.values()), color=color, height=0.7)
     for y, value in enumerate(values.values()):
-        beside_bar(axis, value, y, f"{value:,}" if counts else plain_number(float(f"{value:.2g}")))
+        label_bar(axis, value, y, f"{value:,}" if counts else plain_number(float(f"{value:.2g}")))
     if counts:
         count_axis(axis, "x", label)
     else:
@@ -116,4 +116,4 @@ def _simple(
     axis.set_xlim(0, None)
     listed = "; ".join(f"{n} {plain_number(v)}" for n, v in list(values.items())[:10])
     more = f"; and {len(values) - 10} more" if len(values) > 10 else ""
-    return finished(figure, name, caption, f"Bars of {label}: {listed}{more}.", result)
+    return export_figure(figure, name, caption, f"Bars of {label}: {listed}{more}.", result)

@@ -16,7 +16,7 @@ from manitwin.dataset.statistics.style import (
     Figure,
     canvas,
     count_axis,
-    finished,
+    export_figure,
     legend_above,
     logarithmic_axis,
     plain_number,
@@ -33,8 +33,8 @@ def grasps_per_object(simulated: Result, verified: Result) -> Figure | None:
     figure, (axis,) = canvas(FULL_IN, _HEIGHT_IN)
     top = max(row["low"] for row in (*simulated.rows, *verified.rows)) + _BIN
     edges = np.arange(0, top + _BIN, _BIN)
-    axis.stairs(_heights(simulated, "low", edges[:-1]), edges, fill=True, color=GREY, alpha=0.45, label="simulated")
-    axis.stairs(_heights(verified, "low", edges[:-1]), edges, color=BLUE, linewidth=1.8, label="verified")
+    axis.stairs(_bin_counts(simulated, "low", edges[:-1]), edges, fill=True, color=GREY, alpha=0.45, label="simulated")
+    axis.stairs(_bin_counts(verified, "low", edges[:-1]), edges, color=BLUE, linewidth=1.8, label="verified")
     axis.set_xlim(0, top)
     axis.set_xlabel("grasps per object")
     count_axis(axis, "y", "objects")
@@ -44,7 +44,7 @@ def grasps_per_object(simulated: Result, verified: Result) -> Figure | None:
         for r, label in ((simulated, "Simulated"), (verified, "Verified"))
     )
     caption = f"Grasps per object in steps of {_BIN}: simulated, and of these verified."
-    return finished(figure, "grasps_per_object", caption, alt, simulated, verified)
+    return export_figure(figure, "grasps_per_object", caption, alt, simulated, verified)
 
 
 def counts_per_object(results: Sequence[Result]) -> Figure | None:
@@ -63,7 +63,7 @@ def counts_per_object(results: Sequence[Result]) -> Figure | None:
         said.append(f"{label}: " + ", ".join(f"{row['objects']} with {row['number']}" for row in result.rows))
     alt = f"Bars of objects by number. {'; '.join(said)}."
     caption = "Functional points, grasp points and placements per object."
-    return finished(figure, "points_per_object", caption, alt, *results)
+    return export_figure(figure, "points_per_object", caption, alt, *results)
 
 
 def logarithmic(result: Result, dimensions: Result, steps: int, name: str, quantity: str, unit: str) -> Figure | None:
@@ -73,7 +73,7 @@ def logarithmic(result: Result, dimensions: Result, steps: int, name: str, quant
     figure, (axis,) = canvas(HALF_IN, _HEIGHT_IN)
     at = np.arange(min(row["step"] for row in result.rows), max(row["step"] for row in result.rows) + 1)
     edges = 10 ** (np.append(at, at[-1] + 1) / steps)
-    heights = _heights(result, "step", at)
+    heights = _bin_counts(result, "step", at)
     axis.bar(edges[:-1], heights, width=np.diff(edges) * 0.92, align="edge", color=BLUE)
     axis.set_xlim(edges[0] / 1.1, edges[-1] * 1.1)
     logarithmic_axis(axis, "x", f"{quantity}, {unit}")
@@ -87,7 +87,7 @@ def logarithmic(result: Result, dimensions: Result, steps: int, name: str, quant
         f"{row['max']:.3g} {unit}, median {row['median']:.3g} {unit}."
     )
     caption = f"{quantity[0].upper()}{quantity[1:]} of accepted twins, {steps} steps a decade."
-    return finished(figure, name, caption, alt, result)
+    return export_figure(figure, name, caption, alt, result)
 
 
 def shares(result: Result, name: str, caption: str, label: str, what: str, steps: int) -> Figure | None:
@@ -95,7 +95,7 @@ def shares(result: Result, name: str, caption: str, label: str, what: str, steps
     if not result.rows:
         return None
     figure, (axis,) = canvas(HALF_IN, _HEIGHT_IN)
-    heights = _heights(result, "step", np.arange(steps))
+    heights = _bin_counts(result, "step", np.arange(steps))
     axis.bar(np.arange(steps) / steps, heights, width=0.92 / steps, align="edge", color=BLUE)
     axis.set_xlim(0, 1)
     axis.set_xlabel(label)
@@ -103,10 +103,10 @@ def shares(result: Result, name: str, caption: str, label: str, what: str, steps
     most = _mode(result.rows, "step", what.split()[-1]) / steps
     often = f"{plain_number(most)} to {plain_number(most + 1 / steps)}"
     alt = f"Histogram of the {label} of {sum(heights):,} {what}; most often {often}."
-    return finished(figure, name, caption, alt, result)
+    return export_figure(figure, name, caption, alt, result)
 
 
-def _heights(result: Result, key: str, at: np.ndarray) -> list[int]:
+def _bin_counts(result: Result, key: str, at: np.ndarray) -> list[int]:
     """Return the counts at the bins of a histogram, 0 for bins without a row."""
     (counted,) = set(result.rows[0]) - {key} if result.rows else {""}
     found = {row[key]: row[counted] for row in result.rows}

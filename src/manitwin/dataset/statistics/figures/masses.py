@@ -20,7 +20,7 @@ from manitwin.dataset.statistics.style import (
     YELLOW,
     Figure,
     canvas,
-    finished,
+    export_figure,
     legend_above,
     logarithmic_axis,
     row_canvas,
@@ -74,7 +74,7 @@ def mass_and_size(sample: Result, priors: Result) -> Figure | None:
     caption = (
         f"Mass against longest side, over the intervals that the priors{shown} have of both: darker where more overlap."
     )
-    return finished(figure, "mass_and_size", caption, alt, sample, priors)
+    return export_figure(figure, "mass_and_size", caption, alt, sample, priors)
 
 
 def _points_with_intervals(axis: Axes, rows: list[Row], present: list[str]) -> None:
@@ -140,4 +140,4 @@ def mass_by_category(priors: Result) -> Figure | None:
         for row in rows[:10]
     )
     caption = "Masses of the twins of a category (their number in brackets) beside the interval of its prior."
-    return finished(figure, "mass_by_category", caption, alt, priors)
+    return export_figure(figure, "mass_by_category", caption, alt, priors)

@@ -20,7 +20,7 @@ from manitwin.dataset.statistics.style import (
     SURFACE,
     YELLOW,
     Figure,
-    finished,
+    export_figure,
     shortened,
 )
 
@@ -45,7 +45,7 @@ def word_cloud(result: Result, attribute: str) -> Figure | None:
     if not counts:
         return None
     width, height = int(_WIDTH_PT * _PIXELS_PER_PT), int(_HEIGHT_PT * _PIXELS_PER_PT)
-    words = _placed(counts, width, height)
+    words = _place_words(counts, width, height)
     name = f"words_{attribute}"
     told = ", ".join(f"{term} {count}" for term, count in list(counts.items())[:_TOLD])
     alt = f"Word cloud of {attribute}, {len(words)} terms. Most frequent: {told}."
@@ -55,10 +55,10 @@ def word_cloud(result: Result, attribute: str) -> Figure | None:
         + "\n".join(words)
         + "\n</svg>\n"
     )
-    return finished(svg, name, f"Words of {attribute}.", alt, result)
+    return export_figure(svg, name, f"Words of {attribute}.", alt, result)
 
 
-def _placed(counts: dict[str, int], width: int, height: int) -> list[str]:
+def _place_words(counts: dict[str, int], width: int, height: int) -> list[str]:
     """Return SVG text elements for the words, most frequent first, centred in ``width`` x ``height`` pixels."""
     font_file = font_manager.findfont("DejaVu Sans")
     cloud = WordCloud(

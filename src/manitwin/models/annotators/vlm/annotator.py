@@ -22,7 +22,12 @@ from manitwin.models.annotators.protocol import (
     SelectedPoints,
     Subject,
 )
-from manitwin.models.annotators.vlm.captions import CaptionsAnswer, captions_question, examine_captions, language_of
+from manitwin.models.annotators.vlm.captions import (
+    CaptionsAnswer,
+    admissible_language,
+    caption_findings,
+    captions_question,
+)
 from manitwin.models.annotators.vlm.closer_look import (
     CLOSER_FORM,
     LETTERS,
@@ -32,7 +37,7 @@ from manitwin.models.annotators.vlm.closer_look import (
     nearby_pictures,
     nearby_places,
 )
-from manitwin.models.annotators.vlm.grasp_vote import Ballot, ballots, elect, runners_up
+from manitwin.models.annotators.vlm.grasp_vote import Ballot, ballots, elect_grasps, spare_grasps
 from manitwin.models.annotators.vlm.physical import PhysicalAnswer, physical_estimates, physical_question
 from manitwin.models.annotators.vlm.physical_checks import (
     PhysicalFinding,
@@ -62,11 +67,11 @@ from manitwin.models.annotators.vlm.quality import (
 )
 from manitwin.models.annotators.vlm.template_reader import TemplateReader
 from manitwin.models.vlm.chat_from_spec import anthropic_from_spec, openai_from_spec, replay_from_spec
+from manitwin.models.vlm.concurrent_questions import ask_concurrently
 from manitwin.models.vlm.prices import expected_usd
 from manitwin.models.vlm.protocol import ChatModel, Question
 from manitwin.models.vlm.strict_schema import strict_schema
-from manitwin.models.vlm.structured import Forgetful, ask, probe
-from manitwin.models.vlm.together import asked_together
+from manitwin.models.vlm.structured import ForgettingChat, ask, probe
 from manitwin.twin.point_records import FunctionalPoint
 from manitwin.twin.record import Language
 
@@ -168,10 +173,10 @@ class VlmAnnotator:
         """Describe the object; inadmissible sentences are left out. Raises BadReply if too few remain."""
         question = captions_question(subject, material, extents_m, self.prompts["captions"])
         answered = ask(
-            self.chat, question, CaptionsAnswer, lambda answer: examine_captions(answer, subject.name, extents_m)
+            self.chat, question, CaptionsAnswer, lambda answer: caption_findings(answer, subject.name, extents_m)
         )
         try:
-            return language_of(answered.value, subject.name, extents_m)
+            return admissible_language(answered.value, subject.name, extents_m)
         except BadReply:
             self._forget(question)
             raise
@@ -191,10 +196,10 @@ class VlmAnnotator:
         )
         functional, findings = functional_points(answered.value, numbering, checks)
         votes = self.config.vlm.votes
-        queries = asked_together([self._query(checks, vote, votes) for vote in range(votes)])
+        queries = ask_concurrently([self._grasp_query(checks, vote, votes) for vote in range(votes)])
         cast = [ballot for query in queries for ballot in query]
-        grasp, more = elect(cast, votes, checks)
-        spare = runners_up(cast, votes, checks, [point.candidate for point in grasp])
+        grasp, more = elect_grasps(cast, votes, checks)
+        spare = spare_grasps(cast, votes, checks, [point.candidate for point in grasp])
         return SelectedPoints(functional, grasp, findings + more, spare)
 
     def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> CloserLook:
@@ -234,7 +239,7 @@ class VlmAnnotator:
             *grasps,
         ]
 
-    def _query(self, checks: PlaceChecks, vote: int, votes: int) -> Callable[[], list[Ballot]]:
+    def _grasp_query(self, checks: PlaceChecks, vote: int, votes: int) -> Callable[[], list[Ballot]]:
         """Return a function that asks one of the grasp queries; its pictures are rendered here, in the calling thread."""
         numbering = grasp_numbering(checks.request, vote, votes)
         question = grasp_question(checks, numbering, self.prompts["grasp_points"], vote)
@@ -252,7 +257,7 @@ class VlmAnnotator:
 
     def _forget(self, question: Question) -> None:
         # a cached answer that is unusable would be unusable again
-        if isinstance(self.chat, Forgetful):
+        if isinstance(self.chat, ForgettingChat):
             self.chat.forget(question)
 
     @cached_property

@@ -70,12 +70,12 @@ def captions_question(subject: Subject, material: str, extents_m: np.ndarray, pr
     return Question("captions", instructions, parts, strict_schema(CaptionsAnswer))
 
 
-def examine_captions(answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray) -> list[str]:
+def caption_findings(answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray) -> list[str]:
     """Return the findings about inadmissible texts."""
     findings = []
     for field in (*ATTRIBUTES, *SENTENCES):
-        findings += [f"{field}: {fault}" for fault in _faults(getattr(answer, field), answer, name, extents_m)]
-    for field, other in _repeated(answer):
+        findings += [f"{field}: {fault}" for fault in _text_faults(getattr(answer, field), answer, name, extents_m)]
+    for field, other in _repeated_sentences(answer):
         findings.append(f"{field} repeats {other}: write another sentence")
     if len(answer.label.split()) >= len(answer.detailed.split()):
         findings.append("label is not shorter than detailed: a label has 2 to 5 words, detailed 30 to 60")
@@ -84,23 +84,23 @@ def examine_captions(answer: CaptionsAnswer, name: str | None, extents_m: np.nda
     return findings
 
 
-def language_of(answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray) -> Language:
+def admissible_language(answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray) -> Language:
     """Return the admissible texts, the main caption first.
 
     If the model says twice that the object is not what the user calls it, the category says so. Raises BadReply if an
     attribute, or more than two of the eight sentences, are inadmissible.
     """
     for field in ATTRIBUTES:
-        faults = _faults(getattr(answer, field), answer, name, extents_m)
+        faults = _text_faults(getattr(answer, field), answer, name, extents_m)
         if faults:
             raise BadReply(
                 f"the model's words for {field} cannot be used when asked twice: {faults[0]}; ask another model"
             )
-    repeated = {field for field, _ in _repeated(answer)}
+    repeated = {field for field, _ in _repeated_sentences(answer)}
     kept = [
         getattr(answer, field).strip()
         for field in SENTENCES
-        if field not in repeated and not _faults(getattr(answer, field), answer, name, extents_m)
+        if field not in repeated and not _text_faults(getattr(answer, field), answer, name, extents_m)
     ]
     if len(kept) < LEAST_SENTENCES:
         raise BadReply(
@@ -113,7 +113,7 @@ def language_of(answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray)
     return Language(**attributes | {"category": category}, caption=kept[0], captions=kept)
 
 
-def _faults(text: str, answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray) -> list[str]:
+def _text_faults(text: str, answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray) -> list[str]:
     """Return why a text is inadmissible: it refers to the presentation of the object, or states an impossible length."""
     # words of the name and category are admissible: a camera may be called a camera
     own = f"{name or ''} {answer.category}".lower()
@@ -131,7 +131,7 @@ def _faults(text: str, answer: CaptionsAnswer, name: str | None, extents_m: np.n
     return faults
 
 
-def _repeated(answer: CaptionsAnswer) -> list[tuple[str, str]]:
+def _repeated_sentences(answer: CaptionsAnswer) -> list[tuple[str, str]]:
     """Return the sentences with the same words as an earlier one, with that sentence."""
     seen: dict[tuple[str, ...], str] = {}
     found = []

@@ -10,22 +10,22 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 
 from manitwin.formats.image_file import png_of
-from manitwin.geometry.frames.closer import REACH_SHARE, around
 from manitwin.geometry.frames.feature import FramedMesh
+from manitwin.geometry.frames.nearby_samples import REACH_SHARE, find_nearby_samples
 from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.protocol import CloserPlace, PointsRequest
 from manitwin.models.annotators.vlm.place_checks import PlaceChecks
 from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.question_parts import extents_of, name_line, size_line
 from manitwin.models.vlm.protocol import Picture, Question
 from manitwin.models.vlm.strict_schema import strict_schema
+from manitwin.render.background_colors import background_for, marker_color
 from manitwin.render.cameras import Camera, look_at, project
-from manitwin.render.grounds import ground_for, marker_color
 from manitwin.render.markers import draw_markers, font_px
-from manitwin.render.raycast import merged, seen_tolerance_m, silhouette, visible_points
+from manitwin.render.raycast import merge_parts, silhouette, visibility_tolerance_m, visible_points
 from manitwin.render.renderer import BACKDROP, shared_renderer
 from manitwin.twin.point_records import FunctionalPoint
 
@@ -48,7 +48,7 @@ class CloserChoice(BaseModel):
 
 
 @dataclass(frozen=True)
-class Nearby:
+class PlaceSet:
     """A point with its set of places: positions and normals ``(K, 3)``, marker numbers ``(K,)``, and its camera and letter."""
 
     point: FunctionalPoint
@@ -64,7 +64,7 @@ class Nearby:
         return CloserPlace(self.positions_m[index], self.normals[index])
 
 
-def nearby_places(checks: PlaceChecks, points: Sequence[FunctionalPoint], side_px: int) -> list[Nearby]:
+def nearby_places(checks: PlaceChecks, points: Sequence[FunctionalPoint], side_px: int) -> list[PlaceSet]:
     """Return the points that can be refined, each with its set of places: its own and eleven around it.
 
     The places are surface samples visible from the camera within 15 % of the longest side, on the same side of the object and
@@ -72,16 +72,16 @@ def nearby_places(checks: PlaceChecks, points: Sequence[FunctionalPoint], side_p
     view that sees the point most directly, and looks at the point.
     """
     request = checks.request
-    surface = FramedMesh(merged(list(request.subject.parts)), request.center_of_mass_m, request.subject.seed)
-    found = list[Nearby]()
+    surface = FramedMesh(merge_parts(list(request.subject.parts)), request.center_of_mass_m, request.subject.seed)
+    found = list[PlaceSet]()
     for letter, point in zip(LETTERS, points, strict=False):
         camera = _camera(request, point, REACH_SHARE * surface.size_m, side_px)
         if camera is None:
             continue
-        near = _of_part(checks, point, surface)
+        near = _same_part_samples(checks, point, surface)
         positions = np.concatenate([[point.position_m], surface.samples[0][near]])
         normals = np.concatenate([[point.normal], surface.samples[1][near]])
-        seen = visible_points(positions, normals, camera, surface.caster, seen_tolerance_m(surface.mesh.extents))
+        seen = visible_points(positions, normals, camera, surface.caster, visibility_tolerance_m(surface.mesh.extents))
         if not seen[0] or seen.sum() < LEAST_PLACES:
             continue
         chosen = np.flatnonzero(seen)[
@@ -89,7 +89,7 @@ def nearby_places(checks: PlaceChecks, points: Sequence[FunctionalPoint], side_p
         ]  # starts with the point's own place
         rng = np.random.default_rng([request.subject.seed, _STREAM, LETTERS.index(letter)])
         numbers = rng.permutation(len(chosen)) + 1
-        found.append(Nearby(point, letter, camera, positions[chosen], normals[chosen], numbers))
+        found.append(PlaceSet(point, letter, camera, positions[chosen], normals[chosen], numbers))
     return found
 
 
@@ -105,18 +105,18 @@ def _camera(request: PointsRequest, point: FunctionalPoint, reach_m: float, side
     return Camera(look_at(eye, at), 2 * float(np.arctan(tangent)), side_px, side_px)
 
 
-def _of_part(checks: PlaceChecks, point: FunctionalPoint, surface: FramedMesh) -> np.ndarray:
+def _same_part_samples(checks: PlaceChecks, point: FunctionalPoint, surface: FramedMesh) -> np.ndarray:
     """Return the indices of the samples around a point on the same part; all of them if the shape determines no parts."""
     subject, at = checks.request.subject, np.array(point.position_m)
-    near = around(surface, at, np.array(point.normal))
-    prior = lookup(subject.name or subject.known_as)
+    near = find_nearby_samples(surface, at, np.array(point.normal))
+    prior = find_prior(subject.name or subject.known_as)
     if prior is None or prior.parts is None:
         return near
     found = membership(prior.parts, checks.shape, np.concatenate([at[None], surface.samples[0][near]]))
     return near if found is None else near[found.index[1:] == found.index[0]]
 
 
-def closer_answer(nearby: Sequence[Nearby]) -> type[BaseModel]:
+def closer_answer(nearby: Sequence[PlaceSet]) -> type[BaseModel]:
     """Return the model class of an answer: for each point's letter one of the numbers in its picture."""
     return _answer({each.letter: [str(number) for number in sorted(each.numbers)] for each in nearby})
 
@@ -145,13 +145,13 @@ class NearbyPictures:
     marker: str
 
 
-def nearby_pictures(request: PointsRequest, nearby: Sequence[Nearby]) -> NearbyPictures:
+def nearby_pictures(request: PointsRequest, nearby: Sequence[PlaceSet]) -> NearbyPictures:
     """Draw the places around each point; raises RendererMissing without a renderer."""
     parts = list(request.subject.parts)
     frames = shared_renderer().render(parts, [each.camera for each in nearby])
-    ground = ground_for(frames)
-    pictures = [frame.over(BACKDROP, ground) for frame in frames]
-    color, surface = marker_color(pictures), RayCaster(merged(parts))
+    ground = background_for(frames)
+    pictures = [frame.composited_over(BACKDROP, ground) for frame in frames]
+    color, surface = marker_color(pictures), RayCaster(merge_parts(parts))
     marked = [
         draw_markers(
             clean,
@@ -167,7 +167,7 @@ def nearby_pictures(request: PointsRequest, nearby: Sequence[Nearby]) -> NearbyP
 
 
 def closer_question(
-    request: PointsRequest, nearby: Sequence[Nearby], pictures: NearbyPictures, prompt: Prompt
+    request: PointsRequest, nearby: Sequence[PlaceSet], pictures: NearbyPictures, prompt: Prompt
 ) -> Question:
     """Ask for the best place of each point."""
     subject = request.subject
@@ -186,7 +186,7 @@ def closer_question(
     return Question("closer_look", instructions, asked, strict_schema(closer_answer(nearby)))
 
 
-def chosen_places(answer: BaseModel, nearby: Sequence[Nearby]) -> dict[str, CloserPlace]:
+def chosen_places(answer: BaseModel, nearby: Sequence[PlaceSet]) -> dict[str, CloserPlace]:
     """Return the chosen place of each point that is to be moved, by the point's id."""
     chosen = {each.point.id: each.place(getattr(answer, each.letter).id) for each in nearby}
     own = {each.point.id: each.point.position_m for each in nearby}

@@ -35,7 +35,7 @@ class Ballot:
 
 
 @dataclass(frozen=True)
-class Elected:
+class ElectedPlace:
     """A candidate with the supporting ballots: of each query the nearest one."""
 
     candidate: int
@@ -69,11 +69,11 @@ def ballots(answer: PointsAnswer, numbering: Numbering, checks: PlaceChecks, vot
     for choice in answer.points:
         candidate = numbering.candidates[choice.id]
         wrong = contradiction(choice, candidate, checks)
-        found.append(Ballot(vote, candidate, choice, numbering.translated(choice.rationale), wrong))
+        found.append(Ballot(vote, candidate, choice, numbering.translate_numbers(choice.rationale), wrong))
     return found
 
 
-def elect(cast: list[Ballot], votes: int, checks: PlaceChecks) -> tuple[tuple[GraspPoint, ...], tuple[str, ...]]:
+def elect_grasps(cast: list[Ballot], votes: int, checks: PlaceChecks) -> tuple[tuple[GraspPoint, ...], tuple[str, ...]]:
     """Return 2 to 3 grasp points by support, then confidence, with the findings about them.
 
     A query supports a place if it chose its candidate or one within 2 cm; places that a symmetry of the solid maps onto each
@@ -94,22 +94,22 @@ def elect(cast: list[Ballot], votes: int, checks: PlaceChecks) -> tuple[tuple[Gr
             f"grasp points: candidates {chosen[-1].candidate} and {elected[len(chosen)].candidate} are tied for the last place"
         )
     for number, place in enumerate(chosen):
-        wrong = _leading(place).contradiction
+        wrong = _leading_ballot(place).contradiction
         if wrong is not None:
-            what = f"grasp point g{number}, {_leading(place).choice.label!r} at candidate {place.candidate}"
+            what = f"grasp point g{number}, {_leading_ballot(place).choice.label!r} at candidate {place.candidate}"
             findings.append(f"{what}: {wrong}")
     return tuple(_grasp_point(number, place, checks) for number, place in enumerate(chosen)), tuple(findings)
 
 
-def runners_up(cast: list[Ballot], votes: int, checks: PlaceChecks, taken: list[int]) -> tuple[GraspPoint, ...]:
+def spare_grasps(cast: list[Ballot], votes: int, checks: PlaceChecks, taken: list[int]) -> tuple[GraspPoint, ...]:
     """Return the other places in the order of the vote, except at the candidates ``taken``."""
     others = [place for place in _elected(cast, votes, checks) if place.candidate not in taken]
     return tuple(_grasp_point(len(taken) + number, place, checks) for number, place in enumerate(others))
 
 
-def _elected(cast: list[Ballot], votes: int, checks: PlaceChecks) -> list[Elected]:
+def _elected(cast: list[Ballot], votes: int, checks: PlaceChecks) -> list[ElectedPlace]:
     """Return places in order; each ballot supports only one of them."""
-    left, found = list(cast), list[Elected]()
+    left, found = list(cast), list[ElectedPlace]()
     while left:
         places = [_supporters(candidate, left, votes, checks) for candidate in {b.candidate for b in left}]
         best = min(places, key=lambda place: (*place.rank, -place.exact, place.candidate))
@@ -118,24 +118,24 @@ def _elected(cast: list[Ballot], votes: int, checks: PlaceChecks) -> list[Electe
     return sorted(found, key=lambda place: place.rank)
 
 
-def _supporters(candidate: int, cast: list[Ballot], votes: int, checks: PlaceChecks) -> Elected:
+def _supporters(candidate: int, cast: list[Ballot], votes: int, checks: PlaceChecks) -> ElectedPlace:
     nearest: dict[int, Ballot] = {}
     # the candidate itself precedes its mirror images, which also have distance 0
     nearest_first = sorted(
-        cast, key=lambda b: (_apart_m(b.candidate, candidate, checks), b.candidate != candidate, b.candidate)
+        cast, key=lambda b: (_distance_m(b.candidate, candidate, checks), b.candidate != candidate, b.candidate)
     )
     for ballot in nearest_first:
-        if _apart_m(ballot.candidate, candidate, checks) <= checks.same_place_m:
+        if _distance_m(ballot.candidate, candidate, checks) <= checks.same_place_m:
             nearest.setdefault(ballot.vote, ballot)
-    return Elected(candidate, tuple(nearest[vote] for vote in sorted(nearest)), votes)
+    return ElectedPlace(candidate, tuple(nearest[vote] for vote in sorted(nearest)), votes)
 
 
-def _apart_m(first: int, second: int, checks: PlaceChecks) -> float:
+def _distance_m(first: int, second: int, checks: PlaceChecks) -> float:
     positions = checks.request.positions_m
     return 0.0 if first == second else checks.symmetries.apart_m(positions[first], positions[second])
 
 
-def _leading(place: Elected) -> Ballot:
+def _leading_ballot(place: ElectedPlace) -> Ballot:
     """Return the ballot whose texts are used: of the most frequent type, then at this candidate, then most confident."""
     types = [ballot.choice.type for ballot in place.ballots]
     return max(
@@ -144,8 +144,8 @@ def _leading(place: Elected) -> Ballot:
     )
 
 
-def _grasp_point(number: int, place: Elected, checks: PlaceChecks) -> GraspPoint:
-    leading, request = _leading(place), checks.request
+def _grasp_point(number: int, place: ElectedPlace, checks: PlaceChecks) -> GraspPoint:
+    leading, request = _leading_ballot(place), checks.request
     return GraspPoint(
         id=f"g{number}",
         **request.place(place.candidate),

@@ -8,8 +8,8 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from manitwin.geometry.parts.membership import ROLES
-from manitwin.models.annotators.part_names import roles_named
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.part_names import roles_in_label
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
 from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.question_parts import extents_of, name_line, size_phrase
@@ -105,12 +105,12 @@ def physical_question(subject: Subject, prompt: Prompt) -> Question:
     A declared size is stated, because the mass has to fit it; proportions are not, because the answer is checked against
     them.
     """
-    values = {"count": str(len(subject.views)), "name": name_line(subject.name), "size": _size_said(subject)}
+    values = {"count": str(len(subject.views)), "name": name_line(subject.name), "size": _size_sentence(subject)}
     instructions, parts = prompt.filled(values, [*clean_views(subject), *longest_extent_view(subject)])
     return Question("physical", instructions, parts, strict_schema(PhysicalAnswer))
 
 
-def _size_said(subject: Subject) -> str:
+def _size_sentence(subject: Subject) -> str:
     if not subject.metric:
         return "Nobody has said how large it is."
     extents = extents_of(subject.parts)
@@ -126,12 +126,12 @@ def part_materials(answer: PhysicalAnswer, name: str | None) -> dict[str, str] |
     Of several materials named for a part, the one with more of the mass is used. A neck that is not mentioned has the
     material that necks of such objects share with the head or the handle (priors).
     """
-    prior = lookup(name) or lookup(answer.object)
+    prior = find_prior(name) or find_prior(answer.object)
     if prior is None or prior.parts is None:
         return None
     said: dict[str, str] = {}
     for part in answer.materials:
-        for role in roles_named(part.part, ROLES[prior.parts]):
+        for role in roles_in_label(part.part, ROLES[prior.parts]):
             said.setdefault(role, part.material)
     if "neck" not in said and {"head", "handle"} <= said.keys():
         usual = prior.part_materials

@@ -10,7 +10,7 @@ import numpy as np
 from manitwin.config import PhysicalConfig
 from manitwin.errors import Rejected
 from manitwin.geometry.boxes import upright_extents
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.prior_records import HEAVIEST_CONTENTS_KG_M3, Interval
 from manitwin.models.annotators.priors import load_materials
 from manitwin.models.annotators.protocol import Subject
@@ -86,13 +86,13 @@ def examine_physical(
 ) -> list[PhysicalFinding]:
     """Return all findings about an answer, the impossible ones first."""
     findings = [
-        *_density(answer, mesh, settings),
-        *_against_prior(answer, mesh, name, settings),
-        *_proportions(answer, mesh),
-        *_declared_size(answer, mesh),
-        *_walls(answer),
-        *_friction(answer),
-        *_name(answer, name),
+        *_density_findings(answer, mesh, settings),
+        *_prior_findings(answer, mesh, name, settings),
+        *_proportion_findings(answer, mesh),
+        *_size_findings(answer, mesh),
+        *_wall_findings(answer),
+        *_friction_findings(answer),
+        *_name_findings(answer, name),
     ]
     return sorted(findings, key=lambda finding: finding.rejects is None)
 
@@ -109,7 +109,7 @@ def reject_impossible(findings: list[PhysicalFinding]) -> None:
             raise Rejected(finding.rejects, f"{finding.text} (the model said so when asked twice)")
 
 
-def _density(answer: PhysicalAnswer, mesh: MeasuredMesh, settings: PhysicalConfig) -> list[PhysicalFinding]:
+def _density_findings(answer: PhysicalAnswer, mesh: MeasuredMesh, settings: PhysicalConfig) -> list[PhysicalFinding]:
     """Compare the mass per mesh volume with the configured limits and with the usual density of material and structure."""
     volume_m3 = mesh.volume * mesh.scale(answer) ** 3
     density = answer.mass_kg.typical / volume_m3
@@ -145,26 +145,26 @@ def _usual_density(answer: PhysicalAnswer, mesh: MeasuredMesh) -> tuple[float, f
     return lightest * skin_share / HEAVIER, heaviest * min(skin_share * PARTS_INSIDE, 1.0) * HEAVIER
 
 
-def _against_prior(
+def _prior_findings(
     answer: PhysicalAnswer, mesh: MeasuredMesh, name: str | None, settings: PhysicalConfig
 ) -> list[PhysicalFinding]:
     """Compare longest side (unless the scale is declared) and mass with the prior's intervals."""
-    prior = lookup(name) or lookup(answer.object)
+    prior = find_prior(name) or find_prior(answer.object)
     if prior is None:
         return []
     findings = []
     if not mesh.metric:
         longest = answer.sides_m[0].typical
-        findings += _beyond(
+        findings += _interval_findings(
             prior.category, "longest side", longest, "m", prior.longest_axis_m, settings.size_margin, "implausible_size"
         )
     mass = answer.mass_kg.typical
-    return findings + _beyond(
+    return findings + _interval_findings(
         prior.category, "mass", mass, "kg", prior.mass_kg, settings.mass_margin, "implausible_mass"
     )
 
 
-def _beyond(
+def _interval_findings(
     category: str, what: str, value: float, unit: str, usual: Interval, margin: float, reason: str
 ) -> list[PhysicalFinding]:
     if usual.low <= value <= usual.high:
@@ -174,7 +174,7 @@ def _beyond(
     return [PhysicalFinding(text, reason if impossible else None)]
 
 
-def _proportions(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[PhysicalFinding]:
+def _proportion_findings(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[PhysicalFinding]:
     """Compare the proportions of the answered sides with those of the mesh."""
     said = np.array([side.typical for side in answer.sides_m])
     said, real = said / said[0], mesh.sides / mesh.sides[0]
@@ -190,7 +190,7 @@ def _proportions(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[PhysicalFin
     ]
 
 
-def _declared_size(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[PhysicalFinding]:
+def _size_findings(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[PhysicalFinding]:
     longest, real = answer.sides_m[0], float(mesh.sides[0])
     if not mesh.metric or longest.low / METRIC_FACTOR <= real <= longest.high * METRIC_FACTOR:
         return []
@@ -201,7 +201,7 @@ def _declared_size(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[PhysicalF
     ]
 
 
-def _walls(answer: PhysicalAnswer) -> list[PhysicalFinding]:
+def _wall_findings(answer: PhysicalAnswer) -> list[PhysicalFinding]:
     """Check that a hollow object has a wall thickness, and that the wall fits twice into the shortest side."""
     wall, shortest = answer.wall_thickness_m, answer.sides_m[2].typical
     if answer.structure in ("hollow_closed", "open_container") and wall == 0:
@@ -219,7 +219,7 @@ def _walls(answer: PhysicalAnswer) -> list[PhysicalFinding]:
     return []
 
 
-def _friction(answer: PhysicalAnswer) -> list[PhysicalFinding]:
+def _friction_findings(answer: PhysicalAnswer) -> list[PhysicalFinding]:
     """Check that friction is in the range of dry solids, and that dynamic friction does not exceed static friction."""
     findings = []
     low, high = FRICTION
@@ -236,7 +236,7 @@ def _friction(answer: PhysicalAnswer) -> list[PhysicalFinding]:
     return findings
 
 
-def _name(answer: PhysicalAnswer, name: str | None) -> list[PhysicalFinding]:
+def _name_findings(answer: PhysicalAnswer, name: str | None) -> list[PhysicalFinding]:
     if name is None or answer.same_as_named != "no":
         return []
     return [

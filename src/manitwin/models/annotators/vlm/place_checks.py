@@ -11,7 +11,7 @@ import numpy as np
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, measure_shape
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.symmetry import Symmetries, find_symmetries
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.protocol import PointsRequest
 
 FINGERS_BETWEEN_M = 0.02  # depth below the surface that fingers reach from above (Franka hand: finger pads of 18 mm)
@@ -45,7 +45,7 @@ class PlaceChecks:
     def shape(self) -> Shape:
         """Measurements of the shape, as the rules use them."""
         subject = self.request.subject
-        prior = lookup(subject.name or subject.known_as)
+        prior = find_prior(subject.name or subject.known_as)
         return measure_shape(
             subject.solid,
             self.request.center_of_mass_m,
@@ -78,7 +78,7 @@ class PlaceChecks:
         """Ray caster of the solid."""
         return RayCaster(self.request.subject.solid)
 
-    def of_label(self, label: str, candidate: int) -> str | None:
+    def label_contradiction(self, label: str, candidate: int) -> str | None:
         """Return how geometry contradicts that a candidate is on a part with this name, None if it does not."""
         words = " ".join(label.lower().split())
         position = self.request.positions_m[candidate]
@@ -99,7 +99,7 @@ class PlaceChecks:
                 return f"it is on the body, {1000 * away_m:.0f} mm from the handle that sticks out of it"
         return None
 
-    def of_grasp(self, kind: str, candidate: int) -> str | None:
+    def grasp_contradiction(self, kind: str, candidate: int) -> str | None:
         """Return why two fingers cannot grasp the object at a candidate, None if they can or for another grasp type."""
         if kind not in ("parallel_jaw", "pinch"):
             return None
@@ -159,7 +159,7 @@ class PlaceChecks:
         body, surface = self.shape.body, self.shape.surface_m
         handles = [p for p in body.protrusions if p.reach_m > LEAST_HANDLE_REACH * body.radius_m.max()]
         handles = handles if body.over is None else [body.over]
-        of_handle = np.any([body.belongs(surface, handle) for handle in handles], axis=0)
+        of_handle = np.any([body.protrusion_mask(surface, handle) for handle in handles], axis=0)
         return float(np.linalg.norm(surface[of_handle] - position, axis=1).min()) if of_handle.any() else 0.0
 
 

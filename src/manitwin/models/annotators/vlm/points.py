@@ -70,7 +70,7 @@ class PointsAnswer(BaseModel):
     points: list[Any]
 
     @model_validator(mode="after")
-    def _different(self) -> PointsAnswer:
+    def _check_distinct(self) -> PointsAnswer:
         ids = [point.id for point in self.points]
         if len(set(ids)) < len(ids):
             raise ValueError(f"each id may be used once; they are {', '.join(ids)}")
@@ -108,7 +108,7 @@ class Numbering:
         """Numbers of the candidates that some view shows, ascending."""
         return list(self.candidates)
 
-    def translated(self, text: str) -> str:
+    def translate_numbers(self, text: str) -> str:
         """Return a text with marker numbers replaced by candidate numbers, which are valid outside the query."""
 
         def said(found: re.Match[str]) -> str:
@@ -192,9 +192,9 @@ def examine_points(answer: PointsAnswer, numbering: Numbering, checks: PlaceChec
 
 def contradiction(point: FunctionalChoice | GraspChoice, candidate: int, checks: PlaceChecks) -> str | None:
     """Return how geometry contradicts a point, None if it does not."""
-    wrong = checks.of_label(point.label, candidate)
+    wrong = checks.label_contradiction(point.label, candidate)
     if wrong is None and isinstance(point, GraspChoice):
-        wrong = checks.of_grasp(point.type, candidate)
+        wrong = checks.grasp_contradiction(point.type, candidate)
     return wrong
 
 
@@ -215,7 +215,7 @@ def functional_points(
                 label=choice.label,
                 description=choice.description,
                 confidence=round(choice.confidence * (1.0 if wrong is None else CONTRADICTED), 3),
-                rationale=numbering.translated(choice.rationale),
+                rationale=numbering.translate_numbers(choice.rationale),
             )
         )
     return tuple(points), tuple(findings)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from manitwin.errors import ConfigError, choose_from
+from manitwin.errors import ConfigError, unknown_name_message
 from manitwin.formats.bounded_file import read_text
 from manitwin.models.vlm.protocol import Picture
 
@@ -59,11 +59,11 @@ class Prompt:
         """Return the instructions, and the parts of the question with values and pictures inserted, in the given wording."""
         wordings = (self.question, *self.otherwise)
         before, after = wordings[wording % len(wordings)].split(PICTURES)
-        parts = (_filled(before, values).rstrip(), *pictures, _filled(after, values).lstrip())
-        return _filled(self.instructions, values), parts
+        parts = (_fill_placeholders(before, values).rstrip(), *pictures, _fill_placeholders(after, values).lstrip())
+        return _fill_placeholders(self.instructions, values), parts
 
 
-def _filled(text: str, values: Mapping[str, str]) -> str:
+def _fill_placeholders(text: str, values: Mapping[str, str]) -> str:
     return _PLACEHOLDER.sub(lambda found: values[found.group(1)], text)
 
 
@@ -79,7 +79,7 @@ def load_prompts(folder: Path | None) -> dict[str, Prompt]:
             raise ConfigError(f"vlm.prompts: {folder} is no folder; give one with files such as quality.md")
         for path in sorted(folder.glob("*.md")):
             if path.stem not in PLACEHOLDERS:
-                raise ConfigError(f"{path}: {choose_from('prompt', path.stem, PLACEHOLDERS)}")
+                raise ConfigError(f"{path}: {unknown_name_message('prompt', path.stem, PLACEHOLDERS)}")
             texts[path.stem] = read_text(path, _MAX_BYTES, ConfigError, name=str(path))
     return {name: _parse(name, text) for name, text in texts.items()}
 
@@ -95,7 +95,7 @@ def _parse(name: str, text: str) -> Prompt:
     question, *otherwise = (wording.strip() for wording in found.group(3).split(OTHERWISE))
     for word in _PLACEHOLDER.findall("\n".join([instructions, question, *otherwise])):
         if word not in PLACEHOLDERS[name]:
-            raise ConfigError(f"prompt {name}.md: {choose_from('placeholder', word, PLACEHOLDERS[name])}")
+            raise ConfigError(f"prompt {name}.md: {unknown_name_message('placeholder', word, PLACEHOLDERS[name])}")
     if any(wording.count(PICTURES) != 1 for wording in (question, *otherwise)) or PICTURES in instructions:
         raise ConfigError(
             f"prompt {name}.md: put {PICTURES} into its question exactly once, and not into its instructions"

@@ -49,7 +49,7 @@ class QualityAnswer(BaseModel):
             "geometric implausibility": self.geometric_implausibility,
         }
 
-    def of_severity(self, severity: Severity) -> list[str]:
+    def artifacts_of_severity(self, severity: Severity) -> list[str]:
         """Return the kinds of artifacts with a severity."""
         return [name for name, artifact in self.artifacts.items() if artifact.severity == severity]
 
@@ -89,7 +89,7 @@ def examine_quality(answer: QualityAnswer) -> list[str]:
         findings.append("single_object is unsure: look at every view again and answer yes or no")
     if answer.visual_quality == "unsure":
         findings.append("visual_quality is unsure: look at every view again and answer yes or no")
-    severe, unsure = answer.of_severity("severe"), answer.of_severity("unsure")
+    severe, unsure = answer.artifacts_of_severity("severe"), answer.artifacts_of_severity("unsure")
     if unsure and answer.visual_quality == "yes":
         findings.append(f"{', '.join(unsure)} is unsure, but visual_quality is yes: say none, minor or severe")
     if severe and answer.visual_quality == "yes":
@@ -103,21 +103,21 @@ def examine_quality(answer: QualityAnswer) -> list[str]:
 
 def quality_verdict(answer: QualityAnswer) -> QualityVerdict:
     """Convert the last answer to the verdict; an unsure answer, or a yes against the evidence, counts as no."""
-    doubtful = answer.of_severity("severe") + answer.of_severity("unsure")
+    doubtful = answer.artifacts_of_severity("severe") + answer.artifacts_of_severity("unsure")
     single, sound = answer.single_object == "yes", answer.visual_quality == "yes" and not doubtful
     if isinstance(answer, QualityBesidePhotoAnswer) and answer.like_photo != "yes":
-        said = _said(answer.like_photo) + answer.photo_evidence
+        said = _unsure_prefix(answer.like_photo) + answer.photo_evidence
         return QualityVerdict(single, False, f"not the whole thing that its photo shows: {said}")
     if single and sound:
         return QualityVerdict(True, True, answer.shown)
     reasons = []
     if not single:
-        reasons.append(_said(answer.single_object) + answer.objects_evidence)
+        reasons.append(_unsure_prefix(answer.single_object) + answer.objects_evidence)
     if not sound:
         kinds = [f"{name} ({a.severity}): {a.evidence}" for name, a in answer.artifacts.items() if name in doubtful]
-        reasons.append(_said(answer.visual_quality) + "; ".join([*kinds, answer.quality_evidence]))
+        reasons.append(_unsure_prefix(answer.visual_quality) + "; ".join([*kinds, answer.quality_evidence]))
     return QualityVerdict(single, sound, " | ".join(reasons))
 
 
-def _said(decision: Decision) -> str:
+def _unsure_prefix(decision: Decision) -> str:
     return "unsure when asked twice: " if decision == "unsure" else ""

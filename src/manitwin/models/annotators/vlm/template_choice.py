@@ -13,7 +13,7 @@ from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.question_parts import name_line
 from manitwin.models.annotators.vlm.view_pictures import cut_out_picture
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.fitting.fit import kinds_of, template_for
+from manitwin.models.generators.templates.fitting.fit import alternative_categories, template_for
 from manitwin.models.vlm.protocol import Picture, Question
 from manitwin.models.vlm.strict_schema import strict_schema
 
@@ -21,7 +21,7 @@ NONE_OF_THESE = "none of these"
 
 
 @dataclass(frozen=True)
-class Shown:
+class TemplateInput:
     """The input: the matted photo ``rgba (H, W, 4) uint8``, or a text; ``name`` is the user's name for the object."""
 
     rgba: np.ndarray | None
@@ -56,7 +56,7 @@ def choice_answer() -> type[ChoiceAnswer]:
     return create_model("ChoiceAnswer", __base__=ChoiceAnswer, category=(one_of, ...))  # type: ignore[arg-type]
 
 
-def choice_question(shown: Shown, prompt: Prompt, picture_px: int) -> Question:
+def choice_question(shown: TemplateInput, prompt: Prompt, picture_px: int) -> Question:
     """Ask which template fits."""
     named = [
         f"{category} ({', '.join(template.names)})" if template.names else category
@@ -70,7 +70,7 @@ def choice_question(shown: Shown, prompt: Prompt, picture_px: int) -> Question:
 def examine_choice(answer: ChoiceAnswer, name: str | None) -> list[str]:
     """Return a finding if the user's name for the object is that of another template."""
     said = template_for(name)
-    if said is None or answer.category in (said.category, *kinds_of(said.category)):
+    if said is None or answer.category in (said.category, *alternative_categories(said.category)):
         return []
     return [
         f"the user calls it {name!r}, which is the template {said.category!r}, but the answer is {answer.category!r}:"

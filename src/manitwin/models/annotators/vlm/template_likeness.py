@@ -12,18 +12,18 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.quality import Decision
 from manitwin.models.annotators.vlm.question_parts import name_line
-from manitwin.models.annotators.vlm.template_choice import Shown
+from manitwin.models.annotators.vlm.template_choice import TemplateInput
 from manitwin.models.annotators.vlm.template_measures import (
     MOST_LOOKS,
     MeasuresAnswer,
     PartLook,
     examine_measures,
-    filled_of,
+    filled_template,
     look_answer,
     measures_answer,
     template_values,
 )
-from manitwin.models.generators.templates.filled import Filled
+from manitwin.models.generators.templates.filled_template import FilledTemplate
 from manitwin.models.vlm.protocol import Picture, Question
 from manitwin.models.vlm.strict_schema import strict_schema
 
@@ -63,7 +63,7 @@ class Likeness:
 
     right: bool
     detail: str
-    corrected: Filled
+    corrected: FilledTemplate
     findings: tuple[str, ...] = ()
 
 
@@ -78,7 +78,7 @@ def likeness_answer(category: str) -> type[LikenessAnswer]:
 
 
 def likeness_question(
-    shown: Shown,
+    shown: TemplateInput,
     category: str,
     measures: Mapping[str, float],
     pictures: Sequence[str | Picture],
@@ -106,10 +106,10 @@ def examine_likeness(category: str, answer: LikenessAnswer) -> list[str]:
     return findings + examine_measures(category, answer.corrected)
 
 
-def likeness_of(category: str, answer: LikenessAnswer, findings: tuple[str, ...]) -> Likeness:
+def likeness_verdict(category: str, answer: LikenessAnswer, findings: tuple[str, ...]) -> Likeness:
     """Convert the last answer to the verdict; an unsure answer, or a yes against the evidence, counts as no."""
     right = answer.right == "yes" and not answer.severe
     said = "; ".join(answer.severe) or answer.shown
     if answer.right == "unsure":
         said = f"unsure when asked twice: {said}"
-    return Likeness(right, said, filled_of(category, answer.corrected, answer.looks), findings)
+    return Likeness(right, said, filled_template(category, answer.corrected, answer.looks), findings)

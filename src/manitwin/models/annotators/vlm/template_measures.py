@@ -11,10 +11,10 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model
 
 from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.question_parts import name_line
-from manitwin.models.annotators.vlm.template_choice import Shown
+from manitwin.models.annotators.vlm.template_choice import TemplateInput
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.described import Wish
-from manitwin.models.generators.templates.filled import Filled, color_said, parts_of
+from manitwin.models.generators.templates.filled_template import FilledTemplate, assignable_parts, parse_color
+from manitwin.models.generators.templates.look_phrases import LookRequest
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS
 from manitwin.models.generators.templates.template import Template
 from manitwin.models.vlm.protocol import Question
@@ -26,7 +26,7 @@ _ROUNDING = 0.02  # a bound given to three digits may be answered with two
 
 
 def _known_color(text: str) -> str:
-    if text != UNSAID and color_said(text) is None:
+    if text != UNSAID and parse_color(text) is None:
         raise ValueError(f"no color: give a word of {', '.join(COLORS)}, #rrggbb, or {UNSAID!r}")
     return text
 
@@ -53,9 +53,9 @@ class PartLook(BaseModel):
     material: Literal[(*MATERIALS, UNSAID)]  # type: ignore[valid-type]
 
     @property
-    def wish(self) -> Wish:
+    def look_request(self) -> LookRequest:
         """The requested colour and material."""
-        return Wish(color_said(self.color), MATERIALS.get(self.material))
+        return LookRequest(parse_color(self.color), MATERIALS.get(self.material))
 
 
 class FilledAnswer(BaseModel):
@@ -82,7 +82,7 @@ def measures_answer(category: str) -> type[MeasuresAnswer]:
 @cache
 def look_answer(category: str) -> type[PartLook]:
     """Return the model class of the looks of a template's parts."""
-    one_of = Literal[tuple(parts_of(load_templates()[category]))]  # type: ignore[valid-type]
+    one_of = Literal[tuple(assignable_parts(load_templates()[category]))]  # type: ignore[valid-type]
     return create_model("PartLook", __base__=PartLook, part=(one_of, ...))  # type: ignore[arg-type]
 
 
@@ -122,24 +122,24 @@ def template_values(category: str, measures: Mapping[str, float] | None = None) 
         "category": category,
         "about": about(template),
         "measures": "; ".join(listed),
-        "parts": ", ".join(parts_of(template)),
+        "parts": ", ".join(assignable_parts(template)),
         "colors": ", ".join(COLORS),
     }
 
 
-def measures_question(shown: Shown, category: str, prompt: Prompt, picture_px: int) -> Question:
+def measures_question(shown: TemplateInput, category: str, prompt: Prompt, picture_px: int) -> Question:
     """Ask for a template's measures and looks."""
     values = {"given": shown.given, "name": name_line(shown.name), **template_values(category)}
     instructions, parts = prompt.filled(values, shown.pictures(picture_px))
     return Question("template_measures", instructions, parts, strict_schema(filled_answer(category)))
 
 
-def filled_of(category: str, measures: MeasuresAnswer, looks: Sequence[PartLook]) -> Filled:
+def filled_template(category: str, measures: MeasuresAnswer, looks: Sequence[PartLook]) -> FilledTemplate:
     """Return the filled template of an answer; measures outside their intervals are left out."""
     template, said = load_templates()[category], measures.said()
     kept = {name: value for name, value in said.items() if _within(template, name, value)}
-    filled = Filled(category, kept, {look.part: look.wish for look in looks})
-    return filled if filled.why_no_solid() is None else Filled(category, {}, filled.wishes)
+    filled = FilledTemplate(category, kept, {look.part: look.look_request for look in looks})
+    return filled if filled.solid_error() is None else FilledTemplate(category, {}, filled.wishes)
 
 
 def examine_measures(category: str, measures: MeasuresAnswer) -> list[str]:
@@ -151,7 +151,7 @@ def examine_measures(category: str, measures: MeasuresAnswer) -> list[str]:
         for name, value in said.items()
         if not _within(template, name, value)
     ]
-    why = None if findings else Filled(category, said).why_no_solid()
+    why = None if findings else FilledTemplate(category, said).solid_error()
     return findings if why is None else [f"these measures give no {category}: {why}"]
 
 

@@ -12,7 +12,7 @@ from manitwin.config import VlmConfig
 from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.template_choice import (
     NONE_OF_THESE,
-    Shown,
+    TemplateInput,
     choice_answer,
     choice_question,
     examine_choice,
@@ -21,18 +21,18 @@ from manitwin.models.annotators.vlm.template_likeness import (
     Likeness,
     examine_likeness,
     likeness_answer,
-    likeness_of,
     likeness_question,
+    likeness_verdict,
 )
 from manitwin.models.annotators.vlm.template_measures import (
     about,
     examine_measures,
     filled_answer,
-    filled_of,
+    filled_template,
     measures_question,
 )
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.filled import Filled
+from manitwin.models.generators.templates.filled_template import FilledTemplate
 from manitwin.models.vlm.prices import expected_usd
 from manitwin.models.vlm.protocol import ChatModel, Picture
 from manitwin.models.vlm.strict_schema import strict_schema
@@ -112,23 +112,23 @@ class TemplateReader:
             for name, prompt in self._prompts.items()
         )
 
-    def choose(self, shown: Shown) -> Choice:
+    def choose(self, shown: TemplateInput) -> Choice:
         """Choose the template."""
         question = choice_question(shown, self._prompts["template"], self.settings.picture_px)
         answered = ask(self.chat, question, choice_answer(), lambda answer: examine_choice(answer, shown.name))
         category = answered.value.category
         return Choice(None if category == NONE_OF_THESE else category, answered.findings)
 
-    def fill(self, shown: Shown, category: str) -> tuple[Filled, tuple[str, ...]]:
+    def fill(self, shown: TemplateInput, category: str) -> tuple[FilledTemplate, tuple[str, ...]]:
         """Fill in a template; return it with the findings that remained. Measures with findings are left out."""
         question = measures_question(shown, category, self._prompts["template_measures"], self.settings.picture_px)
         form = filled_answer(category)
         answered = ask(self.chat, question, form, lambda answer: examine_measures(category, answer.measures))
-        return filled_of(category, answered.value.measures, answered.value.looks), answered.findings
+        return filled_template(category, answered.value.measures, answered.value.looks), answered.findings
 
     def compare(
         self,
-        shown: Shown,
+        shown: TemplateInput,
         category: str,
         measures: Mapping[str, float],
         pictures: Sequence[str | Picture],
@@ -140,4 +140,4 @@ class TemplateReader:
         answered = ask(
             self.chat, question, likeness_answer(category), lambda answer: examine_likeness(category, answer)
         )
-        return likeness_of(category, answered.value, answered.findings)
+        return likeness_verdict(category, answered.value, answered.findings)

@@ -13,10 +13,10 @@ from manitwin.geometry.boxes import longest_edges
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.annotators.protocol import PointsRequest, Subject
 from manitwin.models.vlm.protocol import Picture
+from manitwin.render.background_colors import background_of_pixels, marker_color
 from manitwin.render.cameras import Camera, project
-from manitwin.render.grounds import ground_of_pixels, marker_color
 from manitwin.render.markers import draw_markers, font_px
-from manitwin.render.raycast import merged, silhouette
+from manitwin.render.raycast import merge_parts, silhouette
 from manitwin.render.scale_marks import best_camera, draw_dimension, draw_scale_bar
 
 MOST_PHOTOS = 8
@@ -87,7 +87,7 @@ def cut_out_picture(rgba: np.ndarray, side_px: int) -> Picture:
     seen = rgba[top : top + height, left : left + width].astype(np.float32)
     alpha = seen[..., 3:] / 255
     ground = np.empty((side, side, 3), np.float32)
-    ground[...] = ground_of_pixels(rgba[inside][:, :3])
+    ground[...] = background_of_pixels(rgba[inside][:, :3])
     y, x = (side - height) // 2, (side - width) // 2
     ground[y : y + height, x : x + width] *= 1 - alpha
     ground[y : y + height, x : x + width] += alpha * seen[..., :3]
@@ -109,7 +109,7 @@ def marked_views(
     prompting (Yang et al. 2023, arXiv 2310.11441): numbered marks that do not cover the marked places; only candidates
     visible in a view are marked.
     """
-    caster = RayCaster(merged(list(request.subject.parts)))
+    caster = RayCaster(merge_parts(list(request.subject.parts)))
     color = marker_color(pictures)
     parts: list[str | Picture] = []
     for number, (clean, camera, seen) in enumerate(zip(pictures, cameras, visible, strict=True), 1):

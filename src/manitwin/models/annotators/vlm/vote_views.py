@@ -9,9 +9,9 @@ import numpy as np
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.annotators.protocol import PointsRequest
 from manitwin.models.annotators.vlm.view_pictures import read_picture
+from manitwin.render.background_colors import background_for
 from manitwin.render.cameras import ORBIT_FIRST_AZIMUTH_DEG, Camera, orbit_cameras
-from manitwin.render.grounds import ground_for
-from manitwin.render.raycast import merged, seen_tolerance_m, visible_points
+from manitwin.render.raycast import merge_parts, visibility_tolerance_m, visible_points
 from manitwin.render.renderer import BACKDROP, shared_renderer
 
 _ORDER_STREAM = 2
@@ -45,7 +45,7 @@ def views_of_vote(request: PointsRequest, vote: int, votes: int) -> QueryViews:
     """
     if vote == 0 or not len(request.subject.cameras):
         return own_views(request)
-    views = _between(request, vote, votes)
+    views = _render_between_views(request, vote, votes)
     order = np.random.default_rng([request.subject.seed, _ORDER_STREAM, vote]).permutation(len(views.cameras))
     return QueryViews(
         tuple(views.pictures[i] for i in order),
@@ -54,7 +54,7 @@ def views_of_vote(request: PointsRequest, vote: int, votes: int) -> QueryViews:
     )
 
 
-def _between(request: PointsRequest, vote: int, votes: int) -> QueryViews:
+def _render_between_views(request: PointsRequest, vote: int, votes: int) -> QueryViews:
     """Render views at azimuths between the object's own, with elevations shifted by vote, and find the visible candidates."""
     subject = request.subject
     own, parts = subject.cameras, list(subject.parts)
@@ -69,12 +69,12 @@ def _between(request: PointsRequest, vote: int, votes: int) -> QueryViews:
         first_azimuth_deg=ORBIT_FIRST_AZIMUTH_DEG + 360.0 / len(own) * vote / votes,
     )
     frames = shared_renderer().render(parts, cameras)
-    ground = ground_for(frames)
-    surface = merged(parts)
-    caster, tolerance_m = RayCaster(surface), seen_tolerance_m(surface.extents)
+    ground = background_for(frames)
+    surface = merge_parts(parts)
+    caster, tolerance_m = RayCaster(surface), visibility_tolerance_m(surface.extents)
     shown = [visible_points(request.positions_m, request.normals, camera, caster, tolerance_m) for camera in cameras]
     return QueryViews(
-        tuple(frame.over(BACKDROP, ground) for frame in frames),
+        tuple(frame.composited_over(BACKDROP, ground) for frame in frames),
         tuple(cameras),
         tuple(tuple(int(i) for i in np.flatnonzero(row)) for row in shown),
     )

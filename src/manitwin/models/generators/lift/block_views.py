@@ -16,7 +16,7 @@ import numpy as np
 
 from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View
 
-WAYS = 72
+DIRECTION_COUNT = 72
 """Number of directions in which the support functions are compared."""
 ELEVATIONS_DEG, YAWS_DEG = (5.0, 14.0, 27.0, 42.0, 58.0, 76.0), (-36.0, -12.0, 12.0, 36.0)
 PROPORTIONS = (0.4, 1.0, 2.4, 8.0)
@@ -30,8 +30,8 @@ _ROLL_RAD = np.radians(4.0)
 _PRIOR = 0.0015  # residual of one standard deviation of perspective or roll, as a support distance
 _STEPS = np.array([0.01, 0.01, 0.005, 0.02, 0.01, 0.01, 0.003, 0.002, 0.002])
 _SIGNS = np.array(list(product((-0.5, 0.5), repeat=3)))
-_ALIKE = 0.06  # difference of log proportions
-_ALIKE_RAD = np.radians(4.0)
+_SIMILAR_LOG_PROPORTION = 0.06  # difference of log proportions
+_SIMILAR_VIEW_RAD = np.radians(4.0)
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class BlockView:
     width: float
     depth: float
     view: View
-    off: float
+    silhouette_error: float
 
 
 def block_views(mask: np.ndarray, perspective: float, focal_spread: float) -> list[BlockView]:
@@ -52,7 +52,7 @@ def block_views(mask: np.ndarray, perspective: float, focal_spread: float) -> li
 
     The camera is above the block and not rolled. ``perspective`` and ``focal_spread`` are those of ``Evidence``.
     """
-    reach = _support(outline_points(mask))
+    reach = _support_distances(outline_points(mask))
     usual = float(np.log(np.clip(perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE)))
     at = _starts(usual)
     damping = np.full(len(at), 0.01)
@@ -61,13 +61,13 @@ def block_views(mask: np.ndarray, perspective: float, focal_spread: float) -> li
         if number == _COARSE_ROUNDS:
             best = np.argsort((value**2).sum(1), kind="stable")[:_KEPT]
             at, damping, value = at[best], damping[best], value[best]
-        at, value, damping = _improved(at, value, damping, reach, usual, focal_spread)
-    off = np.sqrt((value[:, :WAYS] ** 2).mean(1))
+        at, value, damping = _levenberg_marquardt_step(at, value, damping, reach, usual, focal_spread)
+    off = np.sqrt((value[:, :DIRECTION_COUNT] ** 2).mean(1))
     found: list[BlockView] = []
     for number in np.argsort((value**2).sum(1), kind="stable"):
         each = _block_view(at[number], float(off[number]))
-        near = each.off <= min(MOST_OFF, WORSE * (found[0].off if found else MOST_OFF) + 1e-3)
-        if near and not any(_is_alike(each, other) for other in found):
+        near = each.silhouette_error <= min(MOST_OFF, WORSE * (found[0].silhouette_error if found else MOST_OFF) + 1e-3)
+        if near and not any(_is_similar(each, other) for other in found):
             found.append(each)
     return found[:MOST_VIEWS]
 
@@ -83,13 +83,13 @@ def outline_points(mask: np.ndarray) -> np.ndarray:
     return np.asarray((away + 0.5 * np.sign(away)) / (high - low).max())
 
 
-def _ways() -> np.ndarray:
-    angles = 2 * np.pi * np.arange(WAYS) / WAYS
+def _support_directions() -> np.ndarray:
+    angles = 2 * np.pi * np.arange(DIRECTION_COUNT) / DIRECTION_COUNT
     return np.column_stack([np.cos(angles), np.sin(angles)])
 
 
-def _support(points: np.ndarray) -> np.ndarray:
-    return np.asarray((points @ _ways().T).max(axis=-2))
+def _support_distances(points: np.ndarray) -> np.ndarray:
+    return np.asarray((points @ _support_directions().T).max(axis=-2))
 
 
 def _starts(usual: float) -> np.ndarray:
@@ -121,10 +121,10 @@ def _projected(at: np.ndarray) -> np.ndarray:
 
 def _residuals(at: np.ndarray, reach: np.ndarray, usual: float, focal_spread: float) -> np.ndarray:
     prior = _PRIOR * np.column_stack([(at[:, 3] - usual) / focal_spread, at[:, 2] / _ROLL_RAD])
-    return np.hstack([_support(_projected(at)) - reach, prior])
+    return np.hstack([_support_distances(_projected(at)) - reach, prior])
 
 
-def _improved(
+def _levenberg_marquardt_step(
     at: np.ndarray, value: np.ndarray, damping: np.ndarray, reach: np.ndarray, usual: float, focal_spread: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return all fits after one Levenberg-Marquardt step; steps that do not improve are rejected and damped more."""
@@ -135,7 +135,7 @@ def _improved(
     gram, slope = slopes @ slopes.transpose(0, 2, 1), (slopes @ value[..., None])[..., 0]
     diagonal = np.eye(width) * (damping[:, None] * np.diagonal(gram, axis1=1, axis2=2) + 1e-12)[:, None]
     step = -np.linalg.solve(gram + diagonal, slope[..., None])[..., 0]
-    trial = _bounded(at + np.clip(step, -0.5, 0.5))
+    trial = _clip_parameters(at + np.clip(step, -0.5, 0.5))
     tried = _residuals(trial, reach, usual, focal_spread)
     nearer = (tried**2).sum(1) < (value**2).sum(1)
     return (
@@ -145,7 +145,7 @@ def _improved(
     )
 
 
-def _bounded(at: np.ndarray) -> np.ndarray:
+def _clip_parameters(at: np.ndarray) -> np.ndarray:
     low = np.full(at.shape[1], -np.inf)
     high = -low
     low[1], high[1] = np.radians([1.0, 89.0])
@@ -170,7 +170,7 @@ def _block_view(at: np.ndarray, off: float) -> BlockView:
     return BlockView(float(width), float(depth), view, off)
 
 
-def _is_alike(one: BlockView, other: BlockView) -> bool:
+def _is_similar(one: BlockView, other: BlockView) -> bool:
     sides = np.abs(np.log([one.width / other.width, one.depth / other.depth]))
     angles = np.abs([one.view.elevation_rad - other.view.elevation_rad, one.view.yaw_rad - other.view.yaw_rad])
-    return bool(sides.max() < _ALIKE and angles.max() < _ALIKE_RAD)
+    return bool(sides.max() < _SIMILAR_LOG_PROPORTION and angles.max() < _SIMILAR_VIEW_RAD)

@@ -10,7 +10,13 @@ import numpy as np
 from manifold3d import Manifold
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift.surface import LiftedSurface, from_manifold, normalised, stood, to_manifold
+from manitwin.models.generators.lift.surface import (
+    LiftedSurface,
+    cut_standing_base,
+    from_manifold,
+    normalised,
+    to_manifold,
+)
 from manitwin.models.generators.lift.texture import Crop
 
 SIMPLER_CELLS = 0.15  # tolerance of mesh simplification, in cells
@@ -40,13 +46,13 @@ class CarvingPhoto(Protocol):
     def crop_share(self, points: np.ndarray) -> np.ndarray:
         """Return the positions ``(N, 2)`` of points in the crop, 0 to 1 to the right and down."""
 
-    def toward(self, points: np.ndarray) -> np.ndarray:
+    def camera_directions(self, points: np.ndarray) -> np.ndarray:
         """Return the unit vectors ``(N, 3)`` from points to the camera."""
 
 
 @dataclass(frozen=True)
-class Carved:
-    """A solid carved from several photos, in its resting pose, longest side 1 (see ``Lifted``).
+class CarvedSolid:
+    """A solid carved from several photos, in its resting pose, longest side 1 (see ``LiftedObject``).
 
     ``covered`` is the share of each silhouette that the solid fills. ``to_carved (4, 4)`` transforms points of the surface to
     the frame and unit of the carving. ``camera`` has the estimated parameters of a fixed camera before a turntable; None if
@@ -55,14 +61,14 @@ class Carved:
     """
 
     surface: LiftedSurface
-    outlines: tuple[CarvingPhoto, ...]
-    covered: tuple[float, ...]
+    photos: tuple[CarvingPhoto, ...]
+    covered_shares: tuple[float, ...]
     to_carved: np.ndarray
     camera: dict[str, float] | None = None
     left_out: tuple[str, ...] = ()
 
 
-def carved_of(
+def carved_solid_from_field(
     field: np.ndarray,
     cell: float,
     origin: np.ndarray,
@@ -70,7 +76,7 @@ def carved_of(
     covered: Sequence[float],
     camera: dict[str, float] | None = None,
     base_cuts: tuple[float, ...] = BASE_CUTS,
-) -> Carved:
+) -> CarvedSolid:
     """Return the solid where ``field`` (X, Y, Z; x right, y away, z up) is positive, in its resting pose.
 
     ``cell`` is the spacing of the field and ``origin (3,)`` its first node, in the unit of the carving. ``base_cuts`` are the
@@ -82,18 +88,18 @@ def carved_of(
     frame = vertices[:, [0, 2, 1]] * [1, 1, -1]
     empty = np.zeros((len(vertices), 2)), np.zeros(len(vertices))
     surface = from_manifold(to_manifold(LiftedSurface(frame, np.asarray(mesh.tri_verts, np.int64), *empty)))
-    standing = stood(surface, LEAST_TIP_DEG, base_cuts) or surface
+    standing = cut_standing_base(surface, LEAST_TIP_DEG, base_cuts) or surface
     rest = normalised(standing)
     low, high = standing.vertices.min(axis=0), standing.vertices.max(axis=0)
     size = float((high - low).max())
     to_carved = np.diag([size, size, size, 1.0])
     to_carved[:3, 3] = (low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2
-    return Carved(rest, tuple(outlines), tuple(round(share, 4) for share in covered), to_carved, camera)
+    return CarvedSolid(rest, tuple(outlines), tuple(round(share, 4) for share in covered), to_carved, camera)
 
 
 def _level_set(field: np.ndarray, cell: float, origin: np.ndarray) -> Manifold:
     """Return the solid where ``field`` (X, Y, Z) is positive; raises Rejected if it is empty."""
-    solid = Manifold.level_set(interpolated(field, cell, origin), _bounds(field, cell, origin), 1.3 * cell)
+    solid = Manifold.level_set(field_interpolator(field, cell, origin), _bounds(field, cell, origin), 1.3 * cell)
     solid = solid.simplify(SIMPLER_CELLS * cell)
     if solid.is_empty():
         raise Rejected("generator_failed", "the outlines do not intersect; check the turns", "generate")
@@ -105,7 +111,7 @@ def _bounds(field: np.ndarray, cell: float, origin: np.ndarray) -> list[float]:
     return [*low, *(start + (count - 1) * cell for start, count in zip(low, field.shape, strict=True))]
 
 
-def interpolated(field: np.ndarray, cell: float, origin: np.ndarray) -> Callable[[float, float, float], float]:
+def field_interpolator(field: np.ndarray, cell: float, origin: np.ndarray) -> Callable[[float, float, float], float]:
     """Return a function that interpolates a field (X, Y, Z) trilinearly, with the value ``-cell`` outside.
 
     ``cell`` is the spacing of the field and ``origin (3,)`` its first node. Manifold evaluates millions of points,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.errors import Rejected
-from manitwin.models.annotators.words import article
+from manitwin.models.annotators.descriptions import article
 from manitwin.models.generators.lift.silhouette import CROP_SIDE_PX, analyse_silhouette
 from manitwin.models.generators.lift.texture import crop_object
 
@@ -18,16 +18,16 @@ DISC_ELLIPSE_IOU = 0.965
 
 All rendered templates that reach it without being circular are discs seen at an angle.
 """
-CLEARLY_LESS = 0.5
+CLEARLY_BETTER_FACTOR = 0.5
 """Factor on the unexplained part of a silhouette, compared with a simpler shape (body of revolution, box or ellipse).
 
 It is small because a can has nearly the silhouette of a bucket, and a plate that of a pan with its handle behind it.
 """
-LONG = 1.2
+LONG_ASPECT_RATIO = 1.2
 """Minimum ratio of the longest to the second side of an object whose end does not show its length."""
 
 
-def reject_end_on(
+def reject_end_view(
     extents: np.ndarray, toward_camera: np.ndarray, silhouette_iou: float, rgba: np.ndarray, category: str
 ) -> None:
     """Reject a solid fitted to the end of an object of this ``category`` in ``rgba (H, W, 4) uint8``.
@@ -37,7 +37,7 @@ def reject_end_on(
     and ``toward_camera (3,)`` is the unit vector to the camera in the solid's axes. Raises Rejected ``generator_failed``.
     """
     ellipse_iou = _end_ellipse_iou(extents, toward_camera, rgba)
-    if ellipse_iou is None or 1 - ellipse_iou > CLEARLY_LESS * (1 - silhouette_iou):
+    if ellipse_iou is None or 1 - ellipse_iou > CLEARLY_BETTER_FACTOR * (1 - silhouette_iou):
         return
     raise Rejected(
         "generator_failed",
@@ -47,8 +47,8 @@ def reject_end_on(
     )
 
 
-def shows_no_more_than_an_end(extents: np.ndarray, toward_camera: np.ndarray, rgba: np.ndarray) -> bool:
-    """Tell whether the camera looks along the length of a solid, as in ``reject_end_on``, and the silhouette is an ellipse.
+def is_elliptical_end_view(extents: np.ndarray, toward_camera: np.ndarray, rgba: np.ndarray) -> bool:
+    """Tell whether the camera looks along the length of a solid, as in ``reject_end_view``, and the silhouette is an ellipse.
 
     A ball has that silhouette as well, so it is no evidence that an unnamed object is long, however well a long solid fits.
     """
@@ -58,7 +58,7 @@ def shows_no_more_than_an_end(extents: np.ndarray, toward_camera: np.ndarray, rg
 def _end_ellipse_iou(extents: np.ndarray, toward_camera: np.ndarray, rgba: np.ndarray) -> float | None:
     """Return the overlap of an ellipse with the end view of a long object; None for other views, shapes or silhouettes."""
     shorter, longest = np.argsort(extents)[1:]
-    is_long = extents[longest] >= LONG * extents[shorter]
+    is_long = extents[longest] >= LONG_ASPECT_RATIO * extents[shorter]
     if not is_long or abs(toward_camera[longest]) < np.sqrt(0.5):
         return None
     ellipse_iou = analyse_silhouette(crop_object(rgba, CROP_SIDE_PX).mask).ellipse_iou

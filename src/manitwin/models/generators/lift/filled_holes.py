@@ -13,23 +13,23 @@ from scipy import ndimage
 
 from manitwin.errors import Rejected
 from manitwin.models.generators.templates.fitting.drawing import edges_between, silhouette
-from manitwin.models.generators.templates.fitting.fit import Fitted
+from manitwin.models.generators.templates.fitting.fit import TemplateFit
 from manitwin.models.generators.templates.fitting.view import normalised
 
 SIDE_PX = 256
 LEAST_HOLES = 0.02
 """Minimum share of holes in the visible object; fits ignore smaller holes too."""
-MOST_OPEN = 0.25
+MOST_OPEN_HOLES = 0.25
 """Share of the template's hole area; a mask with more hole area has the holes."""
-LEAST_GROUND = 0.5
+LEAST_BACKGROUND_SHARE = 0.5
 """Minimum share of the template's hole area that is filled with background; a poor fit overlaps only roughly."""
 LEAST_CONTRAST_LAB = 20.0
 """Minimum L*a*b* distance between object and surrounding background; below it the two cannot be told apart."""
-AROUND = 0.12
+BACKGROUND_WIDTH_SHARE = 0.12
 """Width of the surrounding background, as a share of the object's longer side."""
 
 
-def reject_filled_holes(fitted: Fitted, rgba: np.ndarray) -> None:
+def reject_filled_holes(fitted: TemplateFit, rgba: np.ndarray) -> None:
     """Raise Rejected (``generator_failed``) if background is visible in a hole of the object that the mask fills.
 
     ``rgba (H, W, 4) uint8`` has the mask as alpha, with the colours of the photo below it. ``fitted`` is the closest fit of
@@ -45,9 +45,9 @@ def reject_filled_holes(fitted: Fitted, rgba: np.ndarray) -> None:
     pixels = (flat * fitted.box_px + np.array(fitted.center_px)) * scale
     drawn = silhouette(pixels, solid.faces, edges_between(solid.faces), SIDE_PX)[: mask.shape[0], : mask.shape[1]] > 0
     holes_px = int(_holes(drawn).sum())
-    if holes_px < LEAST_HOLES * drawn.sum() or _holes(mask).sum() > MOST_OPEN * holes_px:
+    if holes_px < LEAST_HOLES * drawn.sum() or _holes(mask).sum() > MOST_OPEN_HOLES * holes_px:
         return
-    if _ground_inside(small[..., :3], mask) < LEAST_GROUND * holes_px:
+    if _enclosed_background_px(small[..., :3], mask) < LEAST_BACKGROUND_SHARE * holes_px:
         return
     raise Rejected(
         "generator_failed",
@@ -61,12 +61,12 @@ def _holes(mask: np.ndarray) -> np.ndarray:
     return np.asarray(ndimage.binary_fill_holes(mask) & ~mask)
 
 
-def _ground_inside(rgb: np.ndarray, mask: np.ndarray) -> int:
+def _enclosed_background_px(rgb: np.ndarray, mask: np.ndarray) -> int:
     """Return the number of enclosed pixels of ``mask (H, W) bool`` with colours closer to the background than to the object."""
     lab = cv2.cvtColor(rgb.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
     away_px = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     side_px = max(np.ptp(np.nonzero(mask), axis=1)) + 1
-    beside = (away_px > 3) & (away_px < 3 + AROUND * side_px)
+    beside = (away_px > 3) & (away_px < 3 + BACKGROUND_WIDTH_SHARE * side_px)
     if not beside.any():
         return 0
     ground, thing = np.median(lab[beside], axis=0), np.median(lab[mask], axis=0)

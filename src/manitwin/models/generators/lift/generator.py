@@ -11,13 +11,13 @@ from manitwin.config import Resource
 from manitwin.errors import Unavailable
 from manitwin.formats.glb import write_glb
 from manitwin.models.annotators.vlm.template_reader import TemplateReader
-from manitwin.models.generators.lift import made_text
-from manitwin.models.generators.lift.guided_photo import guided_from_photo
-from manitwin.models.generators.lift.guided_text import guided_from_text
-from manitwin.models.generators.lift.made_photo import Job, from_photo
-from manitwin.models.generators.lift.several import from_views
+from manitwin.models.generators.lift import text_generation
+from manitwin.models.generators.lift.guided_photo import generate_photo_guided
+from manitwin.models.generators.lift.guided_text import generate_text_guided
+from manitwin.models.generators.lift.multi_view_generation import generate_from_views
+from manitwin.models.generators.lift.photo_generation import LiftResult, generate_from_photo
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
-from manitwin.models.generators.templates.text import MAX_CHARACTERS
+from manitwin.models.generators.templates.description_parser import MAX_CHARACTERS
 
 
 class LiftGenerator:
@@ -38,7 +38,7 @@ class LiftGenerator:
         self.model: str | None = None if reader is None else reader.model
         self.needs: Resource = "cpu" if reader is None else "vlm"
         self.expected_usd = 0.0 if reader is None else reader.expected_usd
-        self._jobs: dict[str, Job] = {}
+        self._jobs: dict[str, LiftResult] = {}
 
     def guided_by(self, reader: TemplateReader) -> LiftGenerator:
         """Return this generator with a model that fills in its templates."""
@@ -48,7 +48,7 @@ class LiftGenerator:
         """Return why no template can make a text; None if one can, or if a model will be asked."""
         if self._reader is not None and len(text) <= MAX_CHARACTERS:
             return None
-        return made_text.why_not(text)
+        return text_generation.unsupported_reason(text)
 
     def submit(self, request: GenerationRequest) -> str:
         """Make the mesh; raises Unsupported for a text without a template, Rejected for a photo that ``lift`` cannot make.
@@ -71,18 +71,18 @@ class LiftGenerator:
         self._jobs[job_id] = self._made(request)
         return job_id
 
-    def _made(self, request: GenerationRequest) -> Job:
+    def _made(self, request: GenerationRequest) -> LiftResult:
         if request.rgba is None:
             text = request.text or ""
             if self._reader is None:
-                return made_text.from_text(text, request.seed)
-            return guided_from_text(text, request.seed, self._reader)
+                return text_generation.generate_from_text(text, request.seed)
+            return generate_text_guided(text, request.seed, self._reader)
         if request.views:  # several photos determine the shape without a reader
-            made = from_views(request.views, request.name, request.unit_m)
-            return Job(write_glb([made.part]), made.notes, made.unseen_share, made.known, made.metric)
+            made = generate_from_views(request.views, request.name, request.unit_m)
+            return LiftResult(write_glb([made.part]), made.notes, made.unseen_share, made.known, made.metric)
         if self._reader is None:
-            return from_photo(request.rgba, request.name, request.focal_mm, likely=request.likely)
-        return guided_from_photo(request, self._reader)
+            return generate_from_photo(request.rgba, request.name, request.focal_mm, likely=request.likely)
+        return generate_photo_guided(request, self._reader)
 
     def poll(self, job_id: str) -> JobState:
         """Return ``done``, or ``failed`` if this object does not know the job."""

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from manitwin.geometry.solids.shapes import SolidError
 from manitwin.geometry.solids.sweep import tube
-from manitwin.models.generators.lift.revolution import Turned, outline_of
+from manitwin.models.generators.lift.revolution import RevolutionProfile, projected_half_widths
 
 LEAST_AREA_SHARE = 0.012  # of the silhouette: smaller parts are irregularities of the outline
 LEAST_REACH_SHARE = 0.12  # minimum reach out of the body, over the body's largest radius
@@ -25,13 +25,13 @@ SAMPLES = 28
 _LEAST_RADIUS_PX = 1.5
 
 
-def body_mask(turned: Turned, shape: tuple[int, int]) -> np.ndarray:
+def body_mask(turned: RevolutionProfile, shape: tuple[int, int]) -> np.ndarray:
     """Return the mask (H, W) bool of a body of revolution in the picture."""
-    widths = outline_of(turned, np.arange(shape[0], dtype=float))
+    widths = projected_half_widths(turned, np.arange(shape[0], dtype=float))
     return np.asarray(np.abs(np.arange(shape[1])[None] - turned.column_px) <= widths[:, None])
 
 
-def handle_tubes(mask: np.ndarray, turned: Turned) -> list[Manifold]:
+def handle_tubes(mask: np.ndarray, turned: RevolutionProfile) -> list[Manifold]:
     """Return tubes in the solid's frame (see ``Turned``) for the parts of ``mask`` (H, W) outside the body."""
     body = body_mask(turned, (mask.shape[0], mask.shape[1]))
     outside = ndimage.binary_opening(mask & ~ndimage.binary_dilation(body, iterations=2))
@@ -110,7 +110,7 @@ def _middle(where: np.ndarray, index: np.ndarray) -> int:
     return int(index[rows[nearest], columns[nearest]])
 
 
-def _swept(path: np.ndarray, radii: np.ndarray, loop: bool, turned: Turned) -> Manifold | None:
+def _swept(path: np.ndarray, radii: np.ndarray, loop: bool, turned: RevolutionProfile) -> Manifold | None:
     """Return the tube in the solid's frame, with its ends inside the body; None if it is no valid solid."""
     smooth = gaussian_filter1d(path, max(1.0, len(path) / 40), axis=0, mode="nearest")
     radii = gaussian_filter1d(radii, max(1.0, len(path) / 20), mode="nearest")

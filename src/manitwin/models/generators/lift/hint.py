@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.prior_records import Prior
 
 MOST_OUT_OF_ROUND = 1.3
@@ -15,7 +15,7 @@ MOST_OUT_OF_ROUND = 1.3
 LEAST_ELLIPSE_IOU, ELLIPSE_IN_RECTANGLE = 0.92, 0.85
 """An ellipse fills 0.785 of its bounding rectangle; a rectangle overlaps the ellipse of its moments by 0.84."""
 _CYLINDERS = frozenset({"cylindrical", "short cylindrical"})
-_NO_BALLS = frozenset({"rugby ball"})
+_NON_SPHERICAL_BALLS = frozenset({"rugby ball"})
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class ShapeHint:
 
 def hint_from_name(name: str | None) -> ShapeHint:
     """Return the hint of the prior found for ``name``; an empty hint if there is none."""
-    prior = lookup(name)
+    prior = find_prior(name)
     if prior is None:
         return ShapeHint()
     words = prior.shape.replace("-", " ").split()
@@ -53,17 +53,17 @@ def hint_from_name(name: str | None) -> ShapeHint:
     )
 
 
-def why_not_round(name: str | None, extents: np.ndarray) -> str | None:
+def roundness_conflict(name: str | None, extents: np.ndarray) -> str | None:
     """Return why sides ``(3,)`` contradict a name that says round; None if they do not.
 
     A ball is as wide as high, and a plate is round from above. A plate seen at an angle has an elliptic silhouette, and a
     ball beside its mirror image that of a dumbbell.
     """
-    prior = lookup(name)
+    prior = find_prior(name)
     if prior is None:
         return None
     longest, second, shortest = np.sort(np.asarray(extents, float))[::-1]
-    ball = prior.shape == "round" and prior.category.endswith("ball") and prior.category not in _NO_BALLS
+    ball = prior.shape == "round" and prior.category.endswith("ball") and prior.category not in _NON_SPHERICAL_BALLS
     if ball and longest > MOST_OUT_OF_ROUND * shortest:
         return f"it would be {longest / shortest:.1f} times as long as wide, as no {prior.category} is"
     if prior.shape == "flat and round" and longest > MOST_OUT_OF_ROUND * second:
@@ -73,16 +73,16 @@ def why_not_round(name: str | None, extents: np.ndarray) -> str | None:
 
 def is_cylinder(name: str | None) -> bool:
     """Tell whether a name's category is simply a cylinder."""
-    prior = lookup(name)
+    prior = find_prior(name)
     return prior is not None and prior.shape in _CYLINDERS
 
 
-def why_no_cylinder(name: str | None, silhouette: Mapping[str, float]) -> str | None:
+def cylinder_conflict(name: str | None, silhouette: Mapping[str, float]) -> str | None:
     """Return why the scores of a silhouette contradict a cylinder seen from the side, for a name that says cylinder; else None.
 
     From the side a cylinder is a rectangle; an ellipse is its end, seen at an angle.
     """
-    prior = lookup(name)
+    prior = find_prior(name)
     if prior is None or not is_cylinder(name):
         return None
     if silhouette["rectangle_iou"] > ELLIPSE_IN_RECTANGLE or silhouette["ellipse_iou"] < LEAST_ELLIPSE_IOU:

@@ -18,7 +18,7 @@ _HALVINGS = 24
 _TARGET_CELLS = 2200
 _SOLVER_SIDE_PX = 224
 _SNAP = 0.12  # minimum distance of crossings from grid nodes, as a share of a cell, which avoids sliver triangles
-_AROUND = ((0, 0), (0, 1), (1, 1), (1, 0))  # corners of a cell (row, column), clockwise on the screen
+_CELL_CORNERS = ((0, 0), (0, 1), (1, 1), (1, 0))  # corners of a cell (row, column), clockwise on the screen
 
 
 def inflate(
@@ -54,7 +54,7 @@ def inflate(
     return from_manifold(to_manifold(LiftedSurface(vertices, faces, np.concatenate([uv, uv]), facing)))
 
 
-def limit_of_volume(mask: np.ndarray, volume_px: float, *, fullness: float, most_px: float) -> float:
+def depth_limit_for_volume(mask: np.ndarray, volume_px: float, *, fullness: float, most_px: float) -> float:
     """Return the ``depth_limit_px`` at which the inflated ``mask`` (H, W) has a given volume; at most ``most_px``.
 
     The limit is not the mean thickness: a round object is half again as thick in its middle as in the mean.
@@ -70,7 +70,7 @@ def limit_of_volume(mask: np.ndarray, volume_px: float, *, fullness: float, most
     return high
 
 
-def full_round(mask: np.ndarray) -> float:
+def round_fullness(mask: np.ndarray) -> float:
     """Return the ``fullness`` that makes the inflated ``mask`` (H, W) as thick as its largest circle is wide: 1.41 for a disc."""
     peak_px = float(np.sqrt(max(float(_solve(mask).max()), 1e-9) / 2))
     return float(cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5).max()) / peak_px
@@ -150,7 +150,7 @@ class _Builder:
         self._known: dict[tuple[int, int, int], int] = {}
 
     def add_cell(self, row: int, column: int) -> None:
-        corners = [(row + r, column + c) for r, c in _AROUND]
+        corners = [(row + r, column + c) for r, c in _CELL_CORNERS]
         inside = [bool(self.field[corner] > 0) for corner in corners]
         if inside in ([True, False, True, False], [False, True, False, True]):
             for k in range(4):

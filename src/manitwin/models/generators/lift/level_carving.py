@@ -16,8 +16,8 @@ import numpy as np
 from scipy import ndimage
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift.carved_solid import Carved, carved_of
-from manitwin.models.generators.lift.pinhole import Sight, passing_px, signed_distance
+from manitwin.models.generators.lift.carved_solid import CarvedSolid, carved_solid_from_field
+from manitwin.models.generators.lift.pinhole import PinholeSilhouette, mean_ray_miss_px, signed_distance
 from manitwin.models.generators.lift.texture import Crop, crop_object
 
 HEIGHT_PX = 128
@@ -33,7 +33,7 @@ _FAR = 50.0  # camera distance in object heights at which silhouettes have no pe
 
 
 @dataclass(frozen=True)
-class Outline:
+class LevelSilhouette:
     """Silhouette of one photo: its crop, the mask ``(HEIGHT_PX, W) bool`` of its bounding box, and the column of the axis."""
 
     name: str
@@ -42,7 +42,7 @@ class Outline:
     turn_deg: float
     axis_px: float
 
-    def across(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def project_columns(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the column of points; x to the right and y away from the viewer of the first photo, in pixels."""
         angle = np.deg2rad(self.turn_deg)
         return np.asarray(self.axis_px + x * np.cos(angle) + y * np.sin(angle))
@@ -52,18 +52,18 @@ class Outline:
         rows = np.nonzero(self.crop.mask.any(axis=1))[0]
         columns = np.nonzero(self.crop.mask.any(axis=0))[0]
         scale = (rows[-1] + 1 - rows[0]) / HEIGHT_PX
-        column = columns[0] + (self.across(points[:, 0], -points[:, 2]) + 0.5) * scale
+        column = columns[0] + (self.project_columns(points[:, 0], -points[:, 2]) + 0.5) * scale
         row = rows[0] + (HEIGHT_PX - 0.5 - points[:, 1]) * scale
         height, width = self.crop.mask.shape
         return np.clip(np.column_stack([column / width, row / height]), 0.0, 1.0)
 
-    def toward(self, points: np.ndarray) -> np.ndarray:
+    def camera_directions(self, points: np.ndarray) -> np.ndarray:
         """Return the unit vectors ``(N, 3)`` from points to the camera, which is far away."""
         angle = np.deg2rad(self.turn_deg)
         return np.tile([np.sin(angle), 0.0, np.cos(angle)], (len(points), 1))
 
-    def sight(self, side_px: int) -> Sight:
-        """Return the silhouette as a ``Sight`` of a distant camera, ``side_px`` high."""
+    def pinhole_silhouette(self, side_px: int) -> PinholeSilhouette:
+        """Return the silhouette as a ``PinholeSilhouette`` of a distant camera, ``side_px`` high."""
         scale = side_px / HEIGHT_PX
         size = max(3, round(self.mask.shape[1] * scale)), side_px
         mask = cv2.resize(self.mask.astype(np.float32), size, interpolation=cv2.INTER_LINEAR) > 0.5
@@ -71,20 +71,20 @@ class Outline:
         pose = np.array([[np.cos(angle), np.sin(angle), 0, 0], [0, 0, -1, 0], [-np.sin(angle), np.cos(angle), 0, _FAR]])
         focal = side_px * _FAR
         box = np.array([-(self.axis_px + 0.5) * scale, -side_px / 2])
-        return Sight(signed_distance(mask), box, np.diag([focal, focal, 1.0]) @ pose, focal)
+        return PinholeSilhouette(signed_distance(mask), box, np.diag([focal, focal, 1.0]) @ pose, focal)
 
 
-def placed_outlines(photos: Sequence[tuple[str, np.ndarray]], turns_deg: Sequence[float]) -> list[Outline]:
+def place_silhouettes(photos: Sequence[tuple[str, np.ndarray]], turns_deg: Sequence[float]) -> list[LevelSilhouette]:
     """Return the silhouettes of matted photos (name, ``(H, W, 4) uint8``) with the axis at which the hull covers them best."""
-    return _placed([_outline(name, rgba, turn) for (name, rgba), turn in zip(photos, turns_deg, strict=True)])
+    return _fit_axis_columns([_outline(name, rgba, turn) for (name, rgba), turn in zip(photos, turns_deg, strict=True)])
 
 
-def level_cost_px(outlines: Sequence[Outline], side_px: int) -> float:
+def level_cost_px(outlines: Sequence[LevelSilhouette], side_px: int) -> float:
     """Return the mean distance in pixels by which rays along all silhouettes, ``side_px`` high, miss the others' silhouettes."""
-    return passing_px([outline.sight(side_px) for outline in outlines])
+    return mean_ray_miss_px([outline.pinhole_silhouette(side_px) for outline in outlines])
 
 
-def carve_level(outlines: Sequence[Outline], power: float) -> Carved:
+def carve_level(outlines: Sequence[LevelSilhouette], power: float) -> CarvedSolid:
     """Carve a solid from placed silhouettes.
 
     ``power`` is the exponent of the superellipse at each level if only two directions are seen. Raises Rejected
@@ -92,20 +92,20 @@ def carve_level(outlines: Sequence[Outline], power: float) -> Carved:
     """
     covered = covered_shares(outlines)
     if min(covered) < LEAST_COVERED:
-        raise Rejected("generator_failed", _told(outlines, covered), "generate")
-    return carved_of(*_field(outlines, power), outlines, covered)
+        raise Rejected("generator_failed", _describe_inconsistency(outlines, covered), "generate")
+    return carved_solid_from_field(*_field(outlines, power), outlines, covered)
 
 
-def _outline(name: str, rgba: np.ndarray, turn_deg: float) -> Outline:
+def _outline(name: str, rgba: np.ndarray, turn_deg: float) -> LevelSilhouette:
     crop = crop_object(rgba, 3 * HEIGHT_PX)
     rows, columns = np.nonzero(crop.mask.any(axis=1))[0], np.nonzero(crop.mask.any(axis=0))[0]
     box = crop.mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.float32)
     width = max(3, round(box.shape[1] * HEIGHT_PX / box.shape[0]))
     mask = cv2.resize(box, (width, HEIGHT_PX), interpolation=cv2.INTER_AREA) > 0.5
-    return Outline(name, crop, mask, turn_deg % 360.0, (width - 1) / 2)
+    return LevelSilhouette(name, crop, mask, turn_deg % 360.0, (width - 1) / 2)
 
 
-def same_from_every_side(photos: Sequence[tuple[str, np.ndarray]]) -> bool:
+def has_equal_silhouettes(photos: Sequence[tuple[str, np.ndarray]]) -> bool:
     """Tell whether all silhouettes are about equal, and mirror symmetric, as those of a round object are."""
     masks = [_outline(name, rgba, 0.0).mask for name, rgba in photos]
     widths = [mask.shape[1] for mask in masks]
@@ -117,7 +117,7 @@ def same_from_every_side(photos: Sequence[tuple[str, np.ndarray]]) -> bool:
     return min(float((flat[0] & other).sum() / (flat[0] | other).sum()) for other in others) > LEAST_COVERED
 
 
-def _placed(outlines: list[Outline]) -> list[Outline]:
+def _fit_axis_columns(outlines: list[LevelSilhouette]) -> list[LevelSilhouette]:
     """Return the silhouettes with the axis at which the hull covers them best; the first two that cross define it."""
     fixed = [outlines[0]]
     rest = sorted(outlines[1:], key=lambda o: -abs(np.sin(np.deg2rad(o.turn_deg - outlines[0].turn_deg))))
@@ -128,7 +128,7 @@ def _placed(outlines: list[Outline]) -> list[Outline]:
             continue
         reach = OFFSET_SHARE * outline.mask.shape[1]
         tried = [
-            Outline(outline.name, outline.crop, outline.mask, outline.turn_deg, outline.axis_px + shift)
+            LevelSilhouette(outline.name, outline.crop, outline.mask, outline.turn_deg, outline.axis_px + shift)
             for shift in np.linspace(-reach, reach, OFFSETS)
         ]
         middle = (outline.mask.shape[1] - 1) / 2
@@ -136,7 +136,7 @@ def _placed(outlines: list[Outline]) -> list[Outline]:
     return [next(o for o in fixed if o.name == outline.name and o.mask is outline.mask) for outline in outlines]
 
 
-def _grid(outlines: Sequence[Outline], cells: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def _grid(outlines: Sequence[LevelSilhouette], cells: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Return the coordinates (X, Y), heights (Z) and the cell size of a grid that contains the object."""
     half = max(max(o.axis_px, o.mask.shape[1] - 1 - o.axis_px) for o in outlines) + 3
     cell = max(HEIGHT_PX, 2 * half) / cells
@@ -145,13 +145,13 @@ def _grid(outlines: Sequence[Outline], cells: int) -> tuple[np.ndarray, np.ndarr
     return x, y, np.arange(-2 * cell, HEIGHT_PX + 2 * cell, cell), cell
 
 
-def covered_shares(outlines: Sequence[Outline]) -> list[float]:
+def covered_shares(outlines: Sequence[LevelSilhouette]) -> list[float]:
     """Return for each silhouette the share that the hull fills."""
     x, y, heights, _ = _grid(outlines, CELLS)
     rows = np.round(HEIGHT_PX - 1 - heights).astype(int)
     valid = (rows >= 0) & (rows < HEIGHT_PX)
     inside = np.ones((len(rows), *x.shape), bool)
-    columns = [np.round(o.across(x, y)).astype(int) for o in outlines]
+    columns = [np.round(o.project_columns(x, y)).astype(int) for o in outlines]
     for outline, column in zip(outlines, columns, strict=True):
         within = (column >= 0) & (column < outline.mask.shape[1])
         picked = outline.mask[np.clip(rows, 0, HEIGHT_PX - 1)][:, np.clip(column, 0, outline.mask.shape[1] - 1)]
@@ -168,7 +168,7 @@ def covered_shares(outlines: Sequence[Outline]) -> list[float]:
     return shares
 
 
-def _told(outlines: Sequence[Outline], covered: Sequence[float]) -> str:
+def _describe_inconsistency(outlines: Sequence[LevelSilhouette], covered: Sequence[float]) -> str:
     """Return which photo is inconsistent with the others: the one without which they agree."""
     remedy = (
         "check its turn (degrees, counter-clockwise from above), that it shows the same thing whole, and from its height, or"
@@ -183,7 +183,7 @@ def _told(outlines: Sequence[Outline], covered: Sequence[float]) -> str:
     return f"{names}: these outlines are not of one object at these turns (their hull fills {min(covered):.0%} of one); {remedy}"
 
 
-def _field(outlines: Sequence[Outline], power: float) -> tuple[np.ndarray, float, np.ndarray]:
+def _field(outlines: Sequence[LevelSilhouette], power: float) -> tuple[np.ndarray, float, np.ndarray]:
     """Return the signed distance inside the hull at the nodes of a grid (X, Y, Z), its cell and its first node, in pixels."""
     x, y, heights, cell = _grid(outlines, CELLS)
     row = (HEIGHT_PX - 1 - heights).astype(np.float32)
@@ -193,12 +193,12 @@ def _field(outlines: Sequence[Outline], power: float) -> tuple[np.ndarray, float
     hull = np.full((*x.shape, len(heights)), np.inf, np.float32)
     powers = np.zeros_like(hull)
     for outline in outlines:
-        column = outline.across(x, y).astype(np.float32)
+        column = outline.project_columns(x, y).astype(np.float32)
         at_column = np.repeat(column.reshape(-1, 1), len(row), axis=1)
         at_row = np.repeat(row[None], column.size, axis=0)
         distance = _sampled(_signed_distance(outline.mask), at_column, at_row).reshape(hull.shape)
         hull = np.minimum(hull, distance)
-        relative = _sampled(_from_middle(outline.mask), at_column, at_row, outside=2.0).reshape(hull.shape)
+        relative = _sampled(_relative_row_distance(outline.mask), at_column, at_row, outside=2.0).reshape(hull.shape)
         powers = np.maximum(powers, 0) + relative**power / sum(
             round(o.turn_deg % 180.0) == round(outline.turn_deg % 180.0) for o in outlines
         )
@@ -219,7 +219,7 @@ def _signed_distance(mask: np.ndarray) -> np.ndarray:
     return np.where(padded, inside - 0.5, 0.5 - outside).astype(np.float32)
 
 
-def _from_middle(mask: np.ndarray) -> np.ndarray:
+def _relative_row_distance(mask: np.ndarray) -> np.ndarray:
     """Return the distance of each pixel from the middle of its run in the row: 0 there, 1 at the ends, 2 outside."""
     padded = np.pad(mask, 12)
     found = np.full(padded.shape, 2.0, np.float32)

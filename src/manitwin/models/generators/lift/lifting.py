@@ -10,23 +10,23 @@ import numpy as np
 
 from manitwin.errors import Rejected
 from manitwin.models.generators.lift.candidates import (
-    Made,
-    View,
-    boxed,
-    inflated,
-    revolved,
-    standing_turned,
-    turned_about,
+    CandidateSolid,
+    MeasuredPhoto,
+    box_candidate,
+    choose_revolution_axis,
+    inflation_candidate,
+    side_view_revolution,
+    standing_revolution,
 )
 from manitwin.models.generators.lift.end_on import DISC_ELLIPSE_IOU
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name
 from manitwin.models.generators.lift.primitives import profile
-from manitwin.models.generators.lift.residual import Explained
+from manitwin.models.generators.lift.residual import FitQuality
 from manitwin.models.generators.lift.silhouette import CROP_SIDE_PX, Silhouette, analyse_silhouette
-from manitwin.models.generators.lift.surface import LiftedSurface, assert_solid, normalised, squared
+from manitwin.models.generators.lift.surface import LiftedSurface, align_footprint, assert_solid, normalised
 from manitwin.models.generators.lift.texture import crop_object, paint_unseen
 
-__all__ = ["Lifted", "ShapeHint", "choose_primitive", "hint_from_name", "lift"]
+__all__ = ["LiftedObject", "ShapeHint", "choose_primitive", "hint_from_name", "lift"]
 
 Primitive = Literal["revolution", "box", "inflation"]
 LEAST_IOU = 0.8
@@ -37,7 +37,7 @@ DISC_ELONGATION = 1.15
 
 
 @dataclass(frozen=True)
-class Lifted:
+class LiftedObject:
     """A solid in the glTF frame (Y up, front +Z, longest side 1, lowest point y = 0), its textures and notes.
 
     ``texture (H, W, 3)`` is the photo, for the visible surface; ``unseen (h, w, 3)``, of the same rectangle, is for the rest.
@@ -46,12 +46,12 @@ class Lifted:
 
     surface: LiftedSurface
     texture: np.ndarray
-    unseen: np.ndarray
+    painted_texture: np.ndarray
     notes: dict[str, Any]
-    explained: Explained
+    explained: FitQuality
 
 
-def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
+def lift(rgba: np.ndarray, hint: ShapeHint) -> LiftedObject:
     """Lift the object in ``rgba`` (H, W, 4) uint8, whose alpha is its mask, to a solid.
 
     Raises Rejected ``generator_failed`` for an object that is hollow from below, for an open container whose cavity cannot be
@@ -60,24 +60,24 @@ def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
     crop = crop_object(rgba, CROP_SIDE_PX)
     height, width = crop.mask.shape
     photo = cv2.resize(crop.colours, (width, height), interpolation=cv2.INTER_AREA)
-    view = View(crop, photo, turned_about(analyse_silhouette(crop.mask), hint))
-    primitive, made = _explaining(view, hint)
+    view = MeasuredPhoto(crop, photo, choose_revolution_axis(analyse_silhouette(crop.mask), hint))
+    primitive, made = _simplest_solid(view, hint)
     askew = primitive == "inflation" and made.notes["rests"] == "lying"
-    surface = normalised(squared(made.surface) if askew else made.surface)
+    surface = normalised(align_footprint(made.surface) if askew else made.surface)
     assert_solid(surface)
     notes = {
         "primitive": primitive,
         "silhouette": view.silhouette.scores(),
         "axis_tilt_deg": round(view.silhouette.axis_tilt_deg, 1),
-        "silhouette_iou": round(made.explained.silhouette_iou, 4),
-        "edge_support": None if made.explained.edge_support is None else round(made.explained.edge_support, 4),
+        "silhouette_iou": round(made.quality.silhouette_iou, 4),
+        "edge_support": None if made.quality.edge_support is None else round(made.quality.edge_support, 4),
         **made.notes,
     }
     axis = view.silhouette if primitive == "revolution" else None
-    return Lifted(surface, crop.colours, paint_unseen(crop, axis), notes, made.explained)
+    return LiftedObject(surface, crop.colours, paint_unseen(crop, axis), notes, made.quality)
 
 
-def _explaining(view: View, hint: ShapeHint) -> tuple[Primitive, Made]:
+def _simplest_solid(view: MeasuredPhoto, hint: ShapeHint) -> tuple[Primitive, CandidateSolid]:
     """Return the simplest solid that explains the silhouette; raises Rejected if there is none."""
     if hint.hollow_below:
         raise Rejected(
@@ -94,7 +94,7 @@ def _explaining(view: View, hint: ShapeHint) -> tuple[Primitive, Made]:
             " photo from the side",
             "generate",
         )
-    turned = standing_turned(view, hint, plain=choose_primitive(view.silhouette, hint) == "revolution")
+    turned = standing_revolution(view, hint, plain=choose_primitive(view.silhouette, hint) == "revolution")
     if turned is not None:
         return "revolution", turned
     primitive = choose_primitive(view.silhouette, hint)
@@ -106,12 +106,14 @@ def _explaining(view: View, hint: ShapeHint) -> tuple[Primitive, Made]:
             " a mesh",
             "generate",
         )
-    made = {"revolution": revolved, "box": boxed, "inflation": inflated}[primitive](view, hint)
-    if made.explained.silhouette_iou < LEAST_IOU:
+    made = {"revolution": side_view_revolution, "box": box_candidate, "inflation": inflation_candidate}[primitive](
+        view, hint
+    )
+    if made.quality.silhouette_iou < LEAST_IOU:
         raise Rejected(
             "generator_failed",
             f"lift found no solid that explains the photo: the best one, by {primitive}, overlaps with"
-            f" {made.explained.silhouette_iou:.0%} of the outline (at least {LEAST_IOU:.0%}); choose another generator",
+            f" {made.quality.silhouette_iou:.0%} of the outline (at least {LEAST_IOU:.0%}); choose another generator",
             "generate",
         )
     return primitive, made
@@ -132,12 +134,12 @@ def choose_primitive(silhouette: Silhouette, hint: ShapeHint) -> Primitive:
         return "box"
     convex = silhouette.solidity > 0.95
     symmetric = silhouette.mirror_iou > (0.90 if convex else 0.93) and silhouette.row_fill > 0.985
-    if whole and symmetric and not hint.flat and not hint.boxy and _is_turned(silhouette):
+    if whole and symmetric and not hint.flat and not hint.boxy and _is_revolution(silhouette):
         return "revolution"
     return "inflation"
 
 
-def _is_turned(silhouette: Silhouette) -> bool:
+def _is_revolution(silhouette: Silhouette) -> bool:
     if silhouette.solidity > 0.8:
         return True
     _, radii = profile(silhouette)

@@ -10,11 +10,11 @@ from functools import cache
 
 import numpy as np
 
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.generators.lift.hint import is_cylinder
 from manitwin.models.generators.lift.roundness import ROUND_SHARE
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.fitting.fit import made_of, template_for
+from manitwin.models.generators.templates.fitting.fit import build_fitted_object, template_for
 
 LEAST_SHARE, LEAST_SAID = 0.5, 0.1
 """Minimum share of round objects in the probability of the candidate names, and minimum of that probability."""
@@ -38,7 +38,7 @@ def _is_round_thing(name: str) -> bool:
     template = template_for(name)
     if template is not None:
         return _is_round_template(template.category)
-    prior = lookup(name)
+    prior = find_prior(name)
     return is_cylinder(name) or (prior is not None and prior.shape == "bottle")
 
 
@@ -46,5 +46,7 @@ def _is_round_thing(name: str) -> bool:
 def _is_round_template(category: str) -> bool:
     """Tell whether a template with typical measures is equally thick in both directions across its length."""
     template = load_templates()[category]
-    thin_m, thick_m, _ = np.sort(np.ptp(made_of(template, template.typical()).mesh.vertices, axis=0))
+    thin_m, thick_m, _ = np.sort(
+        np.ptp(build_fitted_object(template, template.typical_measures()).mesh.vertices, axis=0)
+    )
     return bool(thick_m - thin_m <= ROUND_SHARE * thick_m)

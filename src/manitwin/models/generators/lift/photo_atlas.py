@@ -10,20 +10,21 @@ import numpy as np
 from manitwin.models.generators.lift.texture import Crop, paint_unseen
 
 _PAINTED_SHARE = 0.5  # scale of the painted colours, which have no fine detail
-Place = tuple[int, int, int, int]
+AtlasBox = tuple[int, int, int, int]
 """Left, top, width, height in the atlas, in pixels."""
 
 
-def photo_atlas(crops: Sequence[Crop]) -> tuple[np.ndarray, list[Place]]:
+def photo_atlas(crops: Sequence[Crop]) -> tuple[np.ndarray, list[AtlasBox]]:
     """Return an atlas ``(H, W, 3) uint8`` of all crops and their painted colours, with the place of each, crops first."""
     painted = [paint_unseen(crop, None) for crop in crops]
     small = [
         cv2.resize(each, None, fx=_PAINTED_SHARE, fy=_PAINTED_SHARE, interpolation=cv2.INTER_AREA) for each in painted
     ]
     seen = min(
-        (_in_rows([c.colours.shape for c in crops], n) for n in range(1, len(crops) + 1)), key=lambda rows: max(rows[1])
+        (_layout_rows([c.colours.shape for c in crops], n) for n in range(1, len(crops) + 1)),
+        key=lambda rows: max(rows[1]),
     )
-    below = [_in_rows([each.shape for each in small], n) for n in range(1, len(small) + 1)]
+    below = [_layout_rows([each.shape for each in small], n) for n in range(1, len(small) + 1)]
     under = max((rows for rows in below if rows[1][0] <= seen[1][0]), key=lambda rows: rows[1][0], default=below[0])
     (width, height), (other_width, other_height) = seen[1], under[1]
     atlas = np.zeros((height + other_height, max(width, other_width), 3), np.uint8)
@@ -33,9 +34,9 @@ def photo_atlas(crops: Sequence[Crop]) -> tuple[np.ndarray, list[Place]]:
     return atlas, [(left, top, wide, high) for left, top, wide, high in places]
 
 
-def _in_rows(shapes: Sequence[tuple[int, ...]], columns: int) -> tuple[list[Place], tuple[int, int]]:
+def _layout_rows(shapes: Sequence[tuple[int, ...]], columns: int) -> tuple[list[AtlasBox], tuple[int, int]]:
     """Return the places of pictures in rows of ``columns``, and the total width and height."""
-    places: list[Place] = []
+    places: list[AtlasBox] = []
     top = width = 0
     for first in range(0, len(shapes), columns):
         row = shapes[first : first + columns]

@@ -10,14 +10,14 @@ import cv2
 import numpy as np
 
 FAR_PX = 24.0
-"""Maximum distance outside a silhouette that is resolved, in pixels of a ``Sight``; larger distances are set to it."""
+"""Maximum distance outside a silhouette that is resolved, in pixels of a ``PinholeSilhouette``; larger ones are set to it."""
 RIM_RAYS, MOST_PASSING_PX = 48, 6.0
 _STEPS = 40  # samples of a ray through the object's surroundings
 _AROUND = 1.15  # times the object's radius estimated from the silhouettes
 
 
 @dataclass(frozen=True)
-class Sight:
+class PinholeSilhouette:
     """Signed distance to one silhouette in pixels, positive inside, and the camera that saw it.
 
     ``distance (H, W) float32`` is that of ``signed_distance``, for a mask whose first pixel is ``box (2,)`` (x, y) of the
@@ -54,9 +54,9 @@ class Sight:
         middle = (self.rim.min(axis=0) + self.rim.max(axis=0)) / 2
         return middle, float(np.linalg.norm(self.rim - middle, axis=1).max())
 
-    def seen_from(self, matrix: np.ndarray, focal_px: float) -> Sight:
+    def with_camera(self, matrix: np.ndarray, focal_px: float) -> PinholeSilhouette:
         """Return the same silhouette with another camera."""
-        other = Sight(self.distance, self.box, matrix, focal_px)
+        other = PinholeSilhouette(self.distance, self.box, matrix, focal_px)
         for name in (
             "corner",
             "rim",
@@ -78,19 +78,19 @@ class Sight:
         safe = np.where(depth > 1e-6, depth, np.inf)
         return seen[..., 0] / safe, seen[..., 1] / safe, depth
 
-    def inside(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def distance_and_pixel_size(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the signed distance of points ``(..., 3)`` inside the silhouette in pixels, and the size of a pixel at each."""
-        found, depth = self._looked_up(points)
+        found, depth = self._sample_distance(points)
         return found, np.maximum(depth, 1e-6) / self.focal_px
 
-    def inside_px(self, points: np.ndarray) -> np.ndarray:
+    def signed_distance_px(self, points: np.ndarray) -> np.ndarray:
         """Return the signed distance of points ``(..., 3)`` inside the silhouette in pixels."""
-        return self._looked_up(points)[0]
+        return self._sample_distance(points)[0]
 
-    def _looked_up(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _sample_distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         column, row, depth = self.project(points)
         flat = column.reshape(1, -1) - self.corner[0] - 0.5, row.reshape(1, -1) - self.corner[1] - 0.5
-        found = _looked_up(self.distance, *flat).reshape(column.shape)
+        found = _interpolate(self.distance, *flat).reshape(column.shape)
         return np.where(depth > 1e-6, found, -FAR_PX), depth
 
     def rays(self, pixels: np.ndarray) -> np.ndarray:
@@ -98,7 +98,7 @@ class Sight:
         return np.asarray(np.linalg.solve(self.matrix[:, :3], np.column_stack([pixels, np.ones(len(pixels))]).T).T)
 
 
-def _looked_up(image: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.ndarray:
+def _interpolate(image: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.ndarray:
     """Interpolate an image at positions, in slices because OpenCV accepts at most 32,767 columns."""
     size = 1 << 14
     column, row = column.astype(np.float32), row.astype(np.float32)
@@ -127,7 +127,7 @@ def signed_distance(mask: np.ndarray) -> np.ndarray:
     return np.maximum(np.where(padded, inside - 0.5, 0.5 - outside), -FAR_PX).astype(np.float32)
 
 
-def around(sights: Sequence[Sight]) -> tuple[np.ndarray, float]:
+def bounding_sphere(sights: Sequence[PinholeSilhouette]) -> tuple[np.ndarray, float]:
     """Return a centre ``(3,)`` and a radius that contain the object.
 
     The centre is the point nearest to the rays through the centres of the silhouettes.
@@ -144,7 +144,7 @@ def around(sights: Sequence[Sight]) -> tuple[np.ndarray, float]:
     return centre, _AROUND * max(reach)
 
 
-def points_on_rays(own: Sight, pixels: np.ndarray, surroundings: tuple[np.ndarray, float]) -> np.ndarray:
+def points_on_rays(own: PinholeSilhouette, pixels: np.ndarray, surroundings: tuple[np.ndarray, float]) -> np.ndarray:
     """Return points ``(N, steps, 3)`` along the rays through pixels ``(N, 2)`` of one silhouette, within ``surroundings``."""
     centre, radius = surroundings
     depth = float(own.project(centre)[2])
@@ -152,24 +152,24 @@ def points_on_rays(own: Sight, pixels: np.ndarray, surroundings: tuple[np.ndarra
     return np.asarray(own.position + own.rays(pixels)[:, None, :] * depths[None, :, None])
 
 
-def inside_others(sights: Sequence[Sight], number: int, points: np.ndarray) -> np.ndarray:
+def least_distance_px(sights: Sequence[PinholeSilhouette], number: int, points: np.ndarray) -> np.ndarray:
     """Return the minimum signed distance of points ``(..., 3)`` inside all silhouettes but one, in pixels."""
     least = np.full(points.shape[:-1], FAR_PX, np.float32)
     for other, sight in enumerate(sights):
         if other != number:
-            least = np.minimum(least, sight.inside_px(points))
+            least = np.minimum(least, sight.signed_distance_px(points))
     return least
 
 
-def passing_px(sights: Sequence[Sight]) -> float:
+def mean_ray_miss_px(sights: Sequence[PinholeSilhouette]) -> float:
     """Return the mean distance in pixels by which rays along all silhouettes miss the others' silhouettes.
 
     Each ray's distance is limited to MOST_PASSING_PX.
     """
-    surroundings = around(sights)
+    surroundings = bounding_sphere(sights)
     passed = []
     for number, sight in enumerate(sights):
-        best = inside_others(sights, number, points_on_rays(sight, sight.rim_rays, surroundings)).max(axis=1)
+        best = least_distance_px(sights, number, points_on_rays(sight, sight.rim_rays, surroundings)).max(axis=1)
         # the centre of a rim pixel is half a pixel inside the outline
         passed.append(np.clip(0.5 - best, 0.0, MOST_PASSING_PX))
     return float(np.mean(passed))

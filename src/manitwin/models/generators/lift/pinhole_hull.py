@@ -8,7 +8,13 @@ import numpy as np
 from scipy import ndimage
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift.pinhole import FAR_PX, Sight, around, inside_others, points_on_rays
+from manitwin.models.generators.lift.pinhole import (
+    FAR_PX,
+    PinholeSilhouette,
+    bounding_sphere,
+    least_distance_px,
+    points_on_rays,
+)
 
 COARSE_CELLS, CELLS = 24, 96
 """Grid cells along the longest side: of a coarse grid that locates the solid, and of its own grid."""
@@ -19,13 +25,13 @@ _LEAST_DOWNWARD = 0.05  # minimum downward slope of a ray; flatter rays do not d
 _LOWEST_SHARE = 0.25
 
 
-def covered_shares(sights: Sequence[Sight]) -> tuple[list[float], np.ndarray]:
+def covered_shares(sights: Sequence[PinholeSilhouette]) -> tuple[list[float], np.ndarray]:
     """Return the share of each silhouette that the hull fills, and ``(N, N)`` the share of silhouette i for the hull without k.
 
     Each silhouette is tested against the others, which gives the same result as with itself.
     """
     count = len(sights)
-    surroundings = around(sights)
+    surroundings = bounding_sphere(sights)
     shares, without = [], np.zeros((count, count))
     for number, sight in enumerate(sights):
         rows, columns = np.nonzero(sight.distance > 0)
@@ -35,7 +41,7 @@ def covered_shares(sights: Sequence[Sight]) -> tuple[list[float], np.ndarray]:
         each = np.full((count, *points.shape[:2]), FAR_PX, np.float32)
         for other in range(count):
             if other != number:
-                each[other] = sights[other].inside_px(points)
+                each[other] = sights[other].signed_distance_px(points)
         order = np.sort(each, axis=0)[:2]
         shares.append(float(np.mean(order[0].max(axis=1) > -NEAR_PX)))
         for left_out in range(count):
@@ -45,7 +51,7 @@ def covered_shares(sights: Sequence[Sight]) -> tuple[list[float], np.ndarray]:
 
 
 def hull_field(
-    sights: Sequence[Sight], power: float | None, ground: float | None = None, cells: int = CELLS
+    sights: Sequence[PinholeSilhouette], power: float | None, ground: float | None = None, cells: int = CELLS
 ) -> tuple[np.ndarray, float, np.ndarray]:
     """Return the signed distance inside all silhouettes on a grid (X, Y, Z), its cell and its first node, as lengths.
 
@@ -53,7 +59,7 @@ def hull_field(
     from the silhouettes. ``cells`` is the resolution along the longest side. With ``power``, corners left open by silhouettes
     along x and y are rounded to superellipses (Barr 1981). Raises Rejected if the hull is empty.
     """
-    centre, radius = around(sights)
+    centre, radius = bounding_sphere(sights)
     rough = 2 * radius / COARSE_CELLS
     axes = [np.arange(middle - radius, middle + radius + rough, rough) for middle in centre]
     inside = _depth(sights, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)) > -rough
@@ -68,27 +74,27 @@ def hull_field(
     level = ground_level(sights) if ground is None else ground
     depth = np.minimum(_depth(sights, points), points[..., 2] - level)
     if power is not None:
-        depth = _cornered(depth, cell, power)
+        depth = _round_to_superellipse(depth, cell, power)
     smooth = ndimage.gaussian_filter(np.clip(depth, -3 * cell, 3 * cell), 0.5)
     for side in (smooth[0], smooth[-1], smooth[:, 0], smooth[:, -1], smooth[:, :, 0], smooth[:, :, -1]):
         side[...] = -cell
     return smooth, cell, first
 
 
-def ground_level(sights: Sequence[Sight], of: Sequence[int] | None = None) -> float:
+def ground_level(sights: Sequence[PinholeSilhouette], of: Sequence[int] | None = None) -> float:
     """Return the height of the ground on which the object stands, from all cameras or those with indices ``of``.
 
     In each photo, the rays along the silhouette that hit the hull lowest hit it at the ground or just in front of it. The
     result is minus infinity if no camera looks down at the ground.
     """
-    surroundings = around(sights)
+    surroundings = bounding_sphere(sights)
     lowest = []
     for number in range(len(sights)) if of is None else of:
         sight = sights[number]
         points = points_on_rays(sight, sight.rim, surroundings)
         rays = sight.rays(sight.rim)
         downward = -rays[:, 2] / np.linalg.norm(rays, axis=1) > _LEAST_DOWNWARD
-        met = inside_others(sights, number, points) > -0.5
+        met = least_distance_px(sights, number, points) > -0.5
         told = downward & met.any(axis=1)
         if told.any():
             heights = np.where(met, points[..., 2], -np.inf).max(axis=1)[told]
@@ -96,7 +102,7 @@ def ground_level(sights: Sequence[Sight], of: Sequence[int] | None = None) -> fl
     return float(np.quantile(lowest, _LOWEST_SHARE)) if lowest else -np.inf
 
 
-def _cornered(depth: np.ndarray, cell: float, power: float) -> np.ndarray:
+def _round_to_superellipse(depth: np.ndarray, cell: float, power: float) -> np.ndarray:
     """Round each part of each level of a field (X, Y, Z) to a superellipse over its widths along x and y."""
     cut = depth.copy()
     for level in range(depth.shape[2]):
@@ -115,10 +121,10 @@ def _cornered(depth: np.ndarray, cell: float, power: float) -> np.ndarray:
     return cut
 
 
-def _depth(sights: Sequence[Sight], points: np.ndarray) -> np.ndarray:
+def _depth(sights: Sequence[PinholeSilhouette], points: np.ndarray) -> np.ndarray:
     """Return the signed distance of points inside all silhouettes, as lengths."""
     least = np.full(points.shape[:-1], np.inf)
     for sight in sights:
-        inside, pixel = sight.inside(points)
+        inside, pixel = sight.distance_and_pixel_size(points)
         least = np.minimum(least, np.where(inside <= -FAR_PX, -np.inf, inside) * pixel)
     return np.maximum(least, -1e3)

@@ -17,12 +17,12 @@ import numpy as np
 from manitwin.geometry.solids.shapes import box, cylinder, prism, rectangle
 from manitwin.models.generators.lift.block_views import BlockView, block_views
 from manitwin.models.generators.lift.hint import ShapeHint
-from manitwin.models.generators.templates.fitting.evidence import Evidence, evidence_of
-from manitwin.models.generators.templates.fitting.fit import Fitted, first_built
-from manitwin.models.generators.templates.fitting.least_squares import Placed, Problem
+from manitwin.models.generators.templates.fitting.evidence import Evidence, extract_evidence
+from manitwin.models.generators.templates.fitting.fit import TemplateFit, first_solid_fit
+from manitwin.models.generators.templates.fitting.least_squares import PlacedView, Problem
 from manitwin.models.generators.templates.fitting.residual import Residual, residual
 from manitwin.models.generators.templates.fitting.search import Candidate, search
-from manitwin.models.generators.templates.fitting.shape import Family
+from manitwin.models.generators.templates.fitting.shape import ShapeFamily
 from manitwin.models.generators.templates.fitting.view import View
 from manitwin.models.generators.templates.template import Measure, Model, Template
 
@@ -35,7 +35,7 @@ This limit and those above were set on synthetic photos of 43 objects.
 """
 EDGES_SEEN, NEAR_IOU, NEAR_OUTLINE = 0.4, 0.96, 0.0045
 SILENT_EDGES, EXACT_IOU, EXACT_OUTLINE = 0.7, 0.995, 0.001
-"""Limits for a solid that is preferred to a lifted silhouette (``is_rather``).
+"""Limits for a solid that is preferred to a lifted silhouette (``is_preferred_to_lifted``).
 
 Of 164 photos of 57 synthetic objects, those that no solid explains closely gain 0.08 to 0.31 volumetric IoU by visible edges
 (five photos) and 0.2 by their silhouettes (two dice); none loses.
@@ -57,8 +57,8 @@ _ROUNDED = 0.2  # edge radius of a slab over its thickness
 class PlainSolids:
     """The plain solid that explains a photo closely, and the one that explains it best; None if there is none."""
 
-    close: Fitted | None = None
-    nearest: Fitted | None = None
+    close_fit: TemplateFit | None = None
+    best_fit: TemplateFit | None = None
 
 
 def plain_solids(rgba: np.ndarray, hint: ShapeHint, focal_mm: float | None = None) -> PlainSolids:
@@ -66,51 +66,51 @@ def plain_solids(rgba: np.ndarray, hint: ShapeHint, focal_mm: float | None = Non
 
     Solids that contradict ``hint`` are not tried. ``focal_mm`` is the 35 mm equivalent focal length, if known.
     """
-    tried, mask = [solid for solid in solids() if _may_be(solid, hint)], rgba[..., 3] > 127
+    tried, mask = [solid for solid in plain_templates() if _is_compatible(solid, hint)], rgba[..., 3] > 127
     if not tried or _solidity(mask) < LEAST_SOLIDITY:
         return PlainSolids()
-    evidence = evidence_of(rgba, focal_mm)
+    evidence = extract_evidence(rgba, focal_mm)
     blocks = block_views(mask, evidence.perspective, evidence.focal_spread)
     found = [best for solid in tried for best in _fits(solid, evidence, blocks)]
     possible = sorted(filter(_is_possible, found), key=lambda each: each.residual.cost)
     close = [each for each in possible if explains_closely(each.residual)]
-    return PlainSolids(first_built(close, evidence), first_built(possible, evidence))
+    return PlainSolids(first_solid_fit(close, evidence), first_solid_fit(possible, evidence))
 
 
 def _fits(solid: Template, evidence: Evidence, blocks: Sequence[BlockView]) -> list[Candidate]:
     """Return fits of a solid: for a block from the blocks of the silhouette, for a slab from these and from a search."""
     kind = PRIMITIVES[solid.category]
     if kind == "box":
-        return [_block_of(solid, each, evidence) for each in blocks]
-    found = [each for each in search([Family(solid)], evidence, settled=True) if each.upright][:1]
+        return [_fit_block(solid, each, evidence) for each in blocks]
+    found = [each for each in search([ShapeFamily(solid)], evidence, settled=True) if each.upright][:1]
     if kind == "slab":
         found += [
-            _slab_of(solid, each, evidence) for each in blocks if max(each.width, each.depth) * _THICKEST_SLAB >= 1
+            _fit_slab(solid, each, evidence) for each in blocks if max(each.width, each.depth) * _THICKEST_SLAB >= 1
         ]
     return found
 
 
-def _block_of(template: Template, block: BlockView, evidence: Evidence) -> Candidate:
+def _fit_block(template: Template, block: BlockView, evidence: Evidence) -> Candidate:
     """Return the block with rounded edges that is fitted from a sharp block."""
     near = {
         name: Measure(usual / _NEAR, usual, usual * _NEAR, "")
         for name, usual in (("width", block.width), ("depth", block.depth))
     }
-    family = Family(replace(template, measures={**template.measures, **near}))
-    return _refined(family, block.view, evidence)
+    family = ShapeFamily(replace(template, measures={**template.measures, **near}))
+    return _fit_from_view(family, block.view, evidence)
 
 
-def _slab_of(template: Template, block: BlockView, evidence: Evidence) -> Candidate:
+def _fit_slab(template: Template, block: BlockView, evidence: Evidence) -> Candidate:
     """Return the slab with rounded corners and edges that is fitted from a block."""
     length, across = max(block.width, block.depth), min(block.width, block.depth)
-    family = Family(template, {"width": across / length, "thick": 1 / length})
+    family = ShapeFamily(template, {"width": across / length, "thick": 1 / length})
     turn = 0.0 if block.width >= block.depth else np.pi / 2  # the length of a slab is its width seen from the front
-    return _refined(family, replace(block.view, yaw_rad=block.view.yaw_rad + turn), evidence)
+    return _fit_from_view(family, replace(block.view, yaw_rad=block.view.yaw_rad + turn), evidence)
 
 
-def _refined(family: Family, view: View, evidence: Evidence) -> Candidate:
+def _fit_from_view(family: ShapeFamily, view: View, evidence: Evidence) -> Candidate:
     """Return a family's fit from its expected measures and a view, for a camera that is not rolled."""
-    start, begin = np.zeros(len(family.free)), [Placed(view, upright=True)]
+    start, begin = np.zeros(len(family.free)), [PlacedView(view, upright=True)]
     problem = Problem(family, [evidence], turns=False)
     at, (placed,) = problem.solve(start, begin, measures=True, rounds=_ROUNDS)
     solid = family.solid(at)
@@ -119,7 +119,7 @@ def _refined(family: Family, view: View, evidence: Evidence) -> Candidate:
 
 
 @cache
-def solids() -> tuple[Template, ...]:
+def plain_templates() -> tuple[Template, ...]:
     """Return the solids as templates, each with a category of objects that rest in the same pose."""
     block = {"height_m": _fixed(0.1), "width": Measure(0.4, 1.0, 2.5, ""), "depth": Measure(0.3, 0.7, 1.5, "")}
     slab = {
@@ -166,7 +166,7 @@ def _disc(*, width_m: float, thick: float) -> Model:
     return Model().add("body", cylinder(0.5 * width_m, thick * width_m))
 
 
-def _may_be(solid: Template, hint: ShapeHint) -> bool:
+def _is_compatible(solid: Template, hint: ShapeHint) -> bool:
     """Tell whether a solid is compatible with the hint; open containers are none of them."""
     kind = PRIMITIVES[solid.category]
     if hint.container:
@@ -181,7 +181,7 @@ def explains_closely(left: Residual) -> bool:
     return left.iou >= LEAST_IOU and left.outline <= MOST_OUTLINE and left.edges <= MOST_EDGES_MISSING
 
 
-def is_rather(plain: Fitted, lifted: str) -> bool:
+def is_preferred_to_lifted(plain: TemplateFit, lifted: str) -> bool:
     """Tell whether a plain solid is preferred to a primitive that was ``lifted``: a revolution, a box or an inflation.
 
     It is if its inner edges are visible in the photo. A block also is if it has the silhouette to the pixel, because a cube

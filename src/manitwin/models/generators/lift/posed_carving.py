@@ -9,12 +9,12 @@ import numpy as np
 
 from manitwin.errors import Rejected
 from manitwin.formats.camera_poses.posed_camera import PosedCamera
-from manitwin.models.generators.lift.carved_solid import Carved, carved_of
-from manitwin.models.generators.lift.pinhole import Sight, around
+from manitwin.models.generators.lift.carved_solid import CarvedSolid, carved_solid_from_field
+from manitwin.models.generators.lift.pinhole import PinholeSilhouette, bounding_sphere
 from manitwin.models.generators.lift.pinhole_carving import MASK_PX
 from manitwin.models.generators.lift.pinhole_hull import covered_shares, ground_level, hull_field
-from manitwin.models.generators.lift.posed_conventions import LEAST_COVERED, told
-from manitwin.models.generators.lift.posed_sights import PosedPhoto, SeenPosed, posed_photos
+from manitwin.models.generators.lift.posed_conventions import LEAST_COVERED, describe_inconsistency
+from manitwin.models.generators.lift.posed_photos import PosedCarvingPhoto, PosedPhoto, to_carving_frame
 from manitwin.models.generators.lift.texture import crop_object
 from manitwin.models.generators.lift.turntable import SIDE_PX as ROUGH_SIDE_PX
 
@@ -34,7 +34,7 @@ _BASE_CUTS = (0.0, 0.01, 0.02)  # of the height: with measured lengths, base cut
 
 def carve_posed(
     photos: Sequence[tuple[str, np.ndarray]], cameras: Sequence[PosedCamera], turns_deg: Sequence[float]
-) -> tuple[Carved, float]:
+) -> tuple[CarvedSolid, float]:
     """Carve a solid from matted photos (name, ``(H, W, 4) uint8``); return it and the length of its unit in the poses' unit.
 
     The world frame of the cameras has z up; ``turns_deg`` are their rotations about it, 0 for the first. Of six and more
@@ -42,21 +42,23 @@ def carve_posed(
     cameras are in one direction, and if poses and silhouettes are inconsistent, naming the photos, or the convention in which
     they are consistent.
     """
-    posed, unit = posed_photos(photos, cameras, turns_deg)
-    rough = [photo.sight(ROUGH_SIDE_PX)[0] for photo in posed]
-    kept, covered = _going_together(posed, rough, lambda *found: told(photos, cameras, *found))
+    posed, unit = to_carving_frame(photos, cameras, turns_deg)
+    rough = [photo.pinhole_silhouette(ROUGH_SIDE_PX)[0] for photo in posed]
+    kept, covered = _consistent_subset(posed, rough, lambda *found: describe_inconsistency(photos, cameras, *found))
     left_out = tuple(photo.name for number, photo in enumerate(posed) if number not in kept)
     posed = [posed[number] for number in kept]
     _require_crossing([rough[number] for number in kept])
-    sights = [photo.sight(SIDE_PX)[0] for photo in posed]
+    sights = [photo.pinhole_silhouette(SIDE_PX)[0] for photo in posed]
     field, cell, origin = hull_field(sights, None, _ground(sights), CELLS)
-    seen = [SeenPosed(each.name, each.turn_deg, crop_object(each.rgba, MASK_PX), each) for each in posed]
-    carved = replace(carved_of(field, cell, origin, seen, covered, base_cuts=_BASE_CUTS), left_out=left_out)
+    seen = [PosedCarvingPhoto(each.name, each.turn_deg, crop_object(each.rgba, MASK_PX), each) for each in posed]
+    carved = replace(
+        carved_solid_from_field(field, cell, origin, seen, covered, base_cuts=_BASE_CUTS), left_out=left_out
+    )
     return carved, float(carved.to_carved[0, 0]) / unit
 
 
-def _going_together(
-    posed: Sequence[PosedPhoto], sights: Sequence[Sight], told: Callable[[Sequence[float], np.ndarray], str]
+def _consistent_subset(
+    posed: Sequence[PosedPhoto], sights: Sequence[PinholeSilhouette], told: Callable[[Sequence[float], np.ndarray], str]
 ) -> tuple[list[int], list[float]]:
     """Return the photos that are consistent after leaving a few out, and the covered share of each silhouette."""
     kept = list(range(len(posed)))
@@ -72,9 +74,9 @@ def _going_together(
     return kept, covered
 
 
-def _require_crossing(sights: Sequence[Sight]) -> None:
+def _require_crossing(sights: Sequence[PinholeSilhouette]) -> None:
     """Raise Rejected if all cameras look from the same or the opposite direction."""
-    centre, _ = around(sights)
+    centre, _ = bounding_sphere(sights)
     toward = np.array([sight.position - centre for sight in sights])
     toward /= np.linalg.norm(toward, axis=1, keepdims=True)
     sines = np.linalg.norm(np.cross(toward[:, None], toward[None]), axis=2)
@@ -87,12 +89,12 @@ def _require_crossing(sights: Sequence[Sight]) -> None:
         )
 
 
-def _ground(sights: Sequence[Sight]) -> float:
+def _ground(sights: Sequence[PinholeSilhouette]) -> float:
     """Return the height of the ground; minus infinity if some cameras look up at the object and see its lower end.
 
     Cameras high above see bulges instead of the ground, so only the lowest ones are used.
     """
-    centre, _ = around(sights)
+    centre, _ = bounding_sphere(sights)
     heights = []
     for sight in sights:
         toward = sight.position - centre

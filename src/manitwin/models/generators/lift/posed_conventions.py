@@ -9,27 +9,27 @@ import numpy as np
 
 from manitwin.formats.camera_poses.posed_camera import PosedCamera
 from manitwin.models.generators.lift.pinhole_hull import covered_shares
-from manitwin.models.generators.lift.posed_sights import posed_photos
+from manitwin.models.generators.lift.posed_photos import to_carving_frame
 from manitwin.models.generators.lift.turntable import SIDE_PX
 
 LEAST_COVERED = 0.95
 """Minimum share of a silhouette that the hull fills; with correct poses and masks it is 0.98 and more."""
-_FLIPPED = np.diag([1.0, -1.0, -1.0, 1.0])
+_OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 """Converts between camera axes of OpenGL (y up, z backward) and OpenCV (y down, z forward)."""
 _MOST_WRONG = 0.25  # of the photos: tolerated share of inconsistent photos under the right convention
 
 CONVENTIONS: tuple[tuple[Callable[[np.ndarray], np.ndarray], str], ...] = (
     (
-        lambda read: _FLIPPED @ read,
+        lambda read: _OPENGL_TO_OPENCV @ read,
         "the cameras' y and z axes point the other way (OpenGL has y up and z backward, OpenCV y down and z forward): turn both"
         " round in every pose",
     ),
     (
-        lambda read: np.asarray(_FLIPPED @ np.linalg.inv(read) @ _FLIPPED),
+        lambda read: np.asarray(_OPENGL_TO_OPENCV @ np.linalg.inv(read) @ _OPENGL_TO_OPENCV),
         "the matrices are those from the world to an OpenGL camera, and should be from it to the world: invert every one",
     ),
     (
-        lambda read: np.asarray(np.linalg.inv(read) @ _FLIPPED),
+        lambda read: np.asarray(np.linalg.inv(read) @ _OPENGL_TO_OPENCV),
         "the matrices are those from the world to an OpenCV camera, and should be from an OpenGL camera to the world: invert"
         " every one, and turn the y and z axes of the camera round",
     ),
@@ -42,7 +42,7 @@ CONVENTIONS: tuple[tuple[Callable[[np.ndarray], np.ndarray], str], ...] = (
 """Corrections of a world-to-camera pose ``(4, 4)`` that was read in a wrong convention, with their descriptions."""
 
 
-def told(
+def describe_inconsistency(
     photos: Sequence[tuple[str, np.ndarray]],
     cameras: Sequence[PosedCamera],
     covered: Sequence[float],
@@ -53,8 +53,10 @@ def told(
     ``covered`` and ``without`` are those of ``covered_shares``.
     """
     for change, what in CONVENTIONS:
-        posed, _ = posed_photos(photos, [_changed(camera, change) for camera in cameras], [0.0] * len(photos))
-        filled, _ = covered_shares([photo.sight(SIDE_PX)[0] for photo in posed])
+        posed, _ = to_carving_frame(
+            photos, [_apply_convention(camera, change) for camera in cameras], [0.0] * len(photos)
+        )
+        filled, _ = covered_shares([photo.pinhole_silhouette(SIDE_PX)[0] for photo in posed])
         if float(np.quantile(filled, _MOST_WRONG)) >= LEAST_COVERED:
             return f"the outlines are those of one thing where {what}"
     names = [name for name, _ in photos]
@@ -76,7 +78,7 @@ def told(
     )
 
 
-def _changed(camera: PosedCamera, change: Callable[[np.ndarray], np.ndarray]) -> PosedCamera:
+def _apply_convention(camera: PosedCamera, change: Callable[[np.ndarray], np.ndarray]) -> PosedCamera:
     read = np.eye(4)
     read[:3] = camera.world_to_camera if camera.as_read is None else camera.as_read
     return replace(camera, world_to_camera=change(read)[:3])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from manitwin.models.generators.lift.silhouette import Silhouette, turned_upright, turning
+from manitwin.models.generators.lift.silhouette import Silhouette, rotate_upright, upright_transform
 from manitwin.models.generators.lift.surface import LiftedSurface
 
 SIDES = 64
@@ -20,7 +20,7 @@ _INSET = 0.02
 
 def profile(silhouette: Silhouette) -> tuple[np.ndarray, np.ndarray]:
     """Return the rows (K,) of the upright mask and the radius (K,) at each, top to bottom, in pixels."""
-    turned = turned_upright(silhouette.mask, silhouette.axis_tilt_deg)
+    turned = rotate_upright(silhouette.mask, silhouette.axis_tilt_deg)
     rows = rows_on_axis(turned, silhouette.axis_column_px)
     body = turned[rows[0] : rows[-1] + 1]
     column = round(silhouette.axis_column_px)
@@ -49,12 +49,12 @@ def trim_caps(
     Both ends are cut where they narrow like a half-ellipse less than a quarter as deep as its radius; the base also where it
     has less than ``base_share`` of the radius nearby, so that round objects stand.
     """
-    top = _end_of(radii, base_share if base_at_top else 0.0, len(rows))
-    bottom = _end_of(radii[::-1], 0.0 if base_at_top else base_share, len(rows))
+    top = _cap_row_count(radii, base_share if base_at_top else 0.0, len(rows))
+    bottom = _cap_row_count(radii[::-1], 0.0 if base_at_top else base_share, len(rows))
     return rows[top : len(rows) - bottom], radii[top : len(rows) - bottom]
 
 
-def _end_of(radii: np.ndarray, least_share: float, length: int) -> int:
+def _cap_row_count(radii: np.ndarray, least_share: float, length: int) -> int:
     """Return the number of rows to cut at the start of ``radii``."""
     nearby = float(radii[: max(8, length // 4)].max())
     widest = int(np.argmax(radii[: max(8, length // 4)] >= 0.97 * nearby))
@@ -123,7 +123,7 @@ def _projected(silhouette: Silhouette, vertices: np.ndarray) -> np.ndarray:
     """Return the texture coordinates of the photo seen along z."""
     height, width = silhouette.mask.shape
     upright = np.column_stack([silhouette.axis_column_px + _EDGE * vertices[:, 0], -vertices[:, 1]])
-    matrix = np.vstack([turning(height, width, silhouette.axis_tilt_deg), [0, 0, 1]])
+    matrix = np.vstack([upright_transform(height, width, silhouette.axis_tilt_deg), [0, 0, 1]])
     pixels = np.column_stack([upright, np.ones(len(upright))]) @ np.linalg.inv(matrix).T
     return np.column_stack([(pixels[:, 0] + 0.5) / width, 1 - (pixels[:, 1] + 0.5) / height])
 
@@ -133,7 +133,7 @@ def make_box(silhouette: Silhouette, *, depth_share: float) -> LiftedSurface:
 
     The sides continue the colours of the front's edges.
     """
-    corners = _ordered(silhouette.corners)
+    corners = _order_corners(silhouette.corners)
     width = float(np.linalg.norm(corners[1] - corners[0]))
     height = float(np.linalg.norm(corners[3] - corners[0]))
     depth = depth_share * min(width, height)
@@ -150,7 +150,7 @@ def make_box(silhouette: Silhouette, *, depth_share: float) -> LiftedSurface:
     faces = np.concatenate(
         [np.column_stack([a, a + _STEPS + 1, a + 1]), np.column_stack([a + 1, a + _STEPS + 1, a + _STEPS + 2])]
     )
-    rim = _rim()
+    rim = _front_edges()
     p, q = rim[:, 0], rim[:, 1]
     walls = np.concatenate([np.column_stack([q, p, p + count]), np.column_stack([q, p + count, q + count])])
     inset = _INSET + (1 - 2 * _INSET) * flat_uv
@@ -165,7 +165,7 @@ def make_box(silhouette: Silhouette, *, depth_share: float) -> LiftedSurface:
     )
 
 
-def _ordered(corners: np.ndarray) -> np.ndarray:
+def _order_corners(corners: np.ndarray) -> np.ndarray:
     """Return the corners top left, top right, bottom right, bottom left of the rectangle, with the top side uppermost."""
     centre = corners.mean(axis=0)
     angles = np.arctan2(corners[:, 1] - centre[1], corners[:, 0] - centre[0])
@@ -175,7 +175,7 @@ def _ordered(corners: np.ndarray) -> np.ndarray:
     return np.roll(ordered, -start, axis=0).astype(float)
 
 
-def _rim() -> np.ndarray:
+def _front_edges() -> np.ndarray:
     """Return the front's outline edges, directed counter-clockwise on the screen."""
     side, last = _STEPS + 1, _STEPS * (_STEPS + 1)
     k = np.arange(_STEPS)

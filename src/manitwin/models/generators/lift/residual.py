@@ -28,7 +28,7 @@ TELESCOPE_FOV_RAD = np.deg2rad(1.0)
 
 
 @dataclass(frozen=True)
-class Explained:
+class FitQuality:
     """How well a solid explains a photo.
 
     ``silhouette_iou`` is the intersection over union of the rendered silhouette and the mask. ``edge_support`` is the share
@@ -46,12 +46,14 @@ class Explained:
         return self.silhouette_iou - EDGE_WEIGHT * missing
 
     @property
-    def residual(self) -> float:
+    def unexplained_share(self) -> float:
         """Unexplained part: 1 - ``score``."""
         return 1.0 - self.score
 
 
-def explained(mesh: trimesh.Trimesh, camera: Camera, mask: np.ndarray, rgb: np.ndarray | None = None) -> Explained:
+def compute_fit_quality(
+    mesh: trimesh.Trimesh, camera: Camera, mask: np.ndarray, rgb: np.ndarray | None = None
+) -> FitQuality:
     """Render ``mesh`` from ``camera`` and compare it with a photo.
 
     ``mask (H, W) bool`` is the matte and ``rgb (H, W, 3) uint8`` the photo, of the size of the camera's picture or smaller
@@ -66,10 +68,10 @@ def explained(mesh: trimesh.Trimesh, camera: Camera, mask: np.ndarray, rgb: np.n
     union = (shown | wanted).sum()
     iou = float((shown & wanted).sum() / union) if union else 0.0
     if rgb is None:
-        return Explained(iou)
+        return FitQuality(iou)
     facing = np.abs(normals @ small.camera_to_object[:3, 2])
     creases = _creases(depth, normals, facing, shown)
-    return Explained(iou, _edge_support(creases, shown & wanted, cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)))
+    return FitQuality(iou, _edge_support(creases, shown & wanted, cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)))
 
 
 def parallel_camera(mask_shape: tuple[int, int], *, elevation_deg: float = 0.0) -> Camera:

@@ -24,7 +24,7 @@ from scipy.ndimage import gaussian_filter1d, grey_opening, label, median_filter
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.solids.shapes import lathe, union
 from manitwin.models.generators.lift.primitives import rows_on_axis, trim_caps
-from manitwin.models.generators.lift.residual import Explained, explained, parallel_camera
+from manitwin.models.generators.lift.residual import FitQuality, compute_fit_quality, parallel_camera
 from manitwin.models.generators.lift.surface import LiftedSurface, bare_mesh, from_manifold, to_manifold
 
 SIDES, RINGS = 64, 64
@@ -37,7 +37,7 @@ ENDS_APART_DEG = 25.0
 LEVEL_DEG = 4.0  # flat ends in a level view allow this elevation, because corners are never quite sharp
 LEAST_END_PX = 10  # a smaller end does not determine the elevation
 WALL_SHARE = 0.06  # of the radius: default wall thickness of a container
-RIM_SEEN = 0.5  # minimum share of the rim's front edge on edges of the photo for an elevation by the rim
+LEAST_VISIBLE_RIM = 0.5  # minimum share of the rim's front edge on edges of the photo for an elevation by the rim
 ROUND_ENDS_DEG = 57.0  # a silhouette whose upper end fits a steeper view may be round instead
 MOUTH_SHARE = 0.6  # of the largest radius: minimum width of an opening whose rim determines the elevation
 COLLAR_SHARE, COLLAR_RISE = 0.3, 0.08
@@ -49,7 +49,7 @@ _EDGE = 0.97  # texture is sampled within this share of the radius
 
 
 @dataclass(frozen=True)
-class Turned:
+class RevolutionProfile:
     """Profile about a vertical axis: ``radii (K,)`` at ``heights (K,)``, upward, in pixels; the axis is at ``column_px``.
 
     Height h appears in row ``-(h cos(e) - z sin(e))``, where e is ``elevation_deg`` and z points towards the viewer.
@@ -99,7 +99,7 @@ def _runs(filled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.ascontiguousarray(left.T), np.ascontiguousarray(right.T)
 
 
-def without_collars(widths: np.ndarray) -> np.ndarray:
+def remove_collars(widths: np.ndarray) -> np.ndarray:
     """Return half widths (K,) without short bulges between the ends: a pair of handles looks like a collar from the side."""
     opened = grey_opening(widths, size=max(3, round(COLLAR_SHARE * len(widths))), mode="nearest")
     labels, count = label(widths - opened > COLLAR_RISE * widths.max())
@@ -112,11 +112,11 @@ def without_collars(widths: np.ndarray) -> np.ndarray:
     return found
 
 
-def turned_from(rows: np.ndarray, widths: np.ndarray, column_px: float, elevation_deg: float) -> Turned:
+def largest_profile(rows: np.ndarray, widths: np.ndarray, column_px: float, elevation_deg: float) -> RevolutionProfile:
     """Return the largest body of revolution within a silhouette of half ``widths`` at picture ``rows`` (see the module)."""
     if elevation_deg <= 0:
         heights, radii = (each[::-1] for each in trim_caps(-rows, np.maximum(widths, _LEAST * widths.max())))
-        return Turned(heights, radii, column_px, 0.0)
+        return RevolutionProfile(heights, radii, column_px, 0.0)
     angle = np.deg2rad(elevation_deg)
     sine, cosine = float(np.sin(angle)), float(np.cos(angle))
     v = np.concatenate([[-rows[0] + 1.0], -rows, [-rows[-1] - 1.0]])
@@ -135,7 +135,7 @@ def turned_from(rows: np.ndarray, widths: np.ndarray, column_px: float, elevatio
     heights, radii = heights[first : len(heights) - last], radii[first : len(radii) - last]
     if len(heights) >= 16:  # trims what the hull rounds off where the end was seen less steeply
         heights, radii = (each[::-1] for each in trim_caps(heights[::-1], radii[::-1]))
-    return Turned(heights, radii, column_px, elevation_deg)
+    return RevolutionProfile(heights, radii, column_px, elevation_deg)
 
 
 def _flat_end(heights: np.ndarray, radii: np.ndarray, sine: float, cosine: float) -> int:
@@ -145,7 +145,9 @@ def _flat_end(heights: np.ndarray, radii: np.ndarray, sine: float, cosine: float
     return int(covered[np.argmax(radii[covered])])
 
 
-def solid_of(turned: Turned, *, wall_px: float | None = None, tubes: Sequence[Manifold] = ()) -> LiftedSurface:
+def revolve_profile(
+    turned: RevolutionProfile, *, wall_px: float | None = None, tubes: Sequence[Manifold] = ()
+) -> LiftedSurface:
     """Revolve a profile and join ``tubes``; ``wall_px`` hollows it from the top with a wall of that thickness.
 
     The surface has the axis at x = ``column_px``, z = 0, in pixels; ``projected`` sets its visibility and texture
@@ -184,7 +186,7 @@ def _upright(heights: np.ndarray, radii: np.ndarray, column_px: float) -> Manifo
     return turned.transform([[1, 0, 0, column_px], [0, 0, 1, 0], [0, -1, 0, 0]])
 
 
-def projected(
+def project_onto_photo(
     surface: LiftedSurface, mask_shape: tuple[int, int], elevation_deg: float, column_px: float
 ) -> LiftedSurface:
     """Return the surface with its visibility in the photo: ``facing`` by ray casting towards the viewer, ``uv`` by projection.
@@ -210,7 +212,7 @@ def projected(
     return LiftedSurface(surface.vertices, surface.faces, uv, facing)
 
 
-def outline_of(turned: Turned, rows: np.ndarray) -> np.ndarray:
+def projected_half_widths(turned: RevolutionProfile, rows: np.ndarray) -> np.ndarray:
     """Return the half width (K,) of the projected profile at picture ``rows``."""
     sine, cosine = float(np.sin(turned.angle_rad)), float(np.cos(turned.angle_rad))
     if sine == 0:
@@ -224,10 +226,10 @@ def end_elevations(rows: np.ndarray, widths: np.ndarray, column_px: float) -> tu
     bands = _end_band(widths), _end_band(widths[::-1])
     found = [0.0, 0.0]
     for elevation in ELEVATIONS_DEG[1:]:
-        turned = turned_from(rows, widths, column_px, elevation)
+        turned = largest_profile(rows, widths, column_px, elevation)
         if len(turned.heights) < 8:
             break
-        lost = np.abs(widths - outline_of(turned, rows))
+        lost = np.abs(widths - projected_half_widths(turned, rows))
         for k, (band, side) in enumerate(zip(bands, (lost, lost[::-1]), strict=True)):
             if side[:band].sum() <= CORNERS_LOST * band**2:
                 found[k] = elevation
@@ -240,7 +242,9 @@ def _end_band(widths: np.ndarray) -> int:
     return int(np.argmax(reached)) + 1 if reached.any() else len(widths)
 
 
-def chosen_elevation(body: np.ndarray, photo: np.ndarray, *, hollow: bool, handled: bool) -> tuple[Turned, Explained]:
+def fit_elevation(
+    body: np.ndarray, photo: np.ndarray, *, hollow: bool, handled: bool
+) -> tuple[RevolutionProfile, FitQuality]:
     """Return the profile at the elevation that explains the photo best, and how well it does.
 
     ``body (H, W) bool`` is the silhouette, ``photo (H, W, 3)`` its colours; ``hollow`` opens the top; ``handled`` means that
@@ -249,7 +253,7 @@ def chosen_elevation(body: np.ndarray, photo: np.ndarray, *, hollow: bool, handl
     """
     rows, widths, column = half_widths(body)
     if handled:
-        widths = without_collars(widths)
+        widths = remove_collars(widths)
     upper, lower = end_elevations(rows, widths, column)
     if hollow and widths[: _end_band(widths)].max() > MOUTH_SHARE * widths.max():
         both = upper  # a rim is certainly the edge of a disc, a base is often round
@@ -259,13 +263,13 @@ def chosen_elevation(body: np.ndarray, photo: np.ndarray, *, hollow: bool, handl
         both = min(upper, lower) if abs(upper - lower) > ENDS_APART_DEG else (upper + lower) / 2
     both = 0.0 if both <= LEVEL_DEG else both
 
-    def at(elevation: float) -> tuple[Turned, Explained]:
-        turned = turned_from(rows, widths, column, elevation)
-        mesh = bare_mesh(solid_of(turned, wall_px=WALL_SHARE * float(turned.radii.max()) if hollow else None))
+    def at(elevation: float) -> tuple[RevolutionProfile, FitQuality]:
+        turned = largest_profile(rows, widths, column, elevation)
+        mesh = bare_mesh(revolve_profile(turned, wall_px=WALL_SHARE * float(turned.radii.max()) if hollow else None))
         camera = parallel_camera((body.shape[0], body.shape[1]), elevation_deg=elevation)
-        return turned, explained(mesh, camera, body, photo)
+        return turned, compute_fit_quality(mesh, camera, body, photo)
 
     tilted = at(both)
-    if upper <= ROUND_ENDS_DEG or hollow or (tilted[1].edge_support or 0.0) >= RIM_SEEN:
+    if upper <= ROUND_ENDS_DEG or hollow or (tilted[1].edge_support or 0.0) >= LEAST_VISIBLE_RIM:
         return tilted
     return at(0.0)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from manitwin.models.generators.templates.fitting.fit import LEAST_CONFIDENCE, Fitted, fit
+from manitwin.models.generators.templates.fitting.fit import LEAST_CONFIDENCE, TemplateFit, fit
 
 BOX = "box"
 CORNERS = 6
@@ -22,7 +22,7 @@ MOST_TURN_DEG, MOST_UNEQUAL = 40.0, 0.6
 _TOLERANCES = np.geomspace(0.004, 0.05, 24)  # of the outline's length
 
 
-def box_from_corner(rgba: np.ndarray, focal_mm: float | None = None) -> Fitted | None:
+def fit_corner_box(rgba: np.ndarray, focal_mm: float | None = None) -> TemplateFit | None:
     """Return the box that explains ``rgba (H, W, 4) uint8``, whose alpha is the mask; None for another silhouette."""
     corners = six_corners(rgba[..., 3] > 127)
     sides = None if corners is None else box_sides(corners)

@@ -64,7 +64,7 @@ def analyse_silhouette(mask: np.ndarray) -> Silhouette:
     cv2.fillConvexPoly(filled, np.round(rectangle).astype(np.int32), 1)
     long_tilt, elongation = _principal_axis(mask)
     tilt, iou = _mirror_axis(mask, long_tilt)
-    turned = turned_upright(mask, tilt)
+    turned = rotate_upright(mask, tilt)
     column, _ = _best_column(turned)
     radius = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
     ridge = mask & (radius >= cv2.dilate(radius, np.ones((3, 3), np.uint8)) - 1e-3) & (radius > 1.5)
@@ -85,21 +85,21 @@ def analyse_silhouette(mask: np.ndarray) -> Silhouette:
     )
 
 
-def about_the_other_axis(silhouette: Silhouette) -> Silhouette:
+def about_perpendicular_axis(silhouette: Silhouette) -> Silhouette:
     """Return the measurements about the mirror axis perpendicular to the one found."""
     mask = silhouette.mask
     long_tilt, _ = _principal_axis(mask)
     across = abs((silhouette.axis_tilt_deg - long_tilt + 90.0) % 180.0 - 90.0) > 45.0
-    tilt, iou = _refined_axis(mask, _made_small(mask), long_tilt if across else long_tilt + 90.0)
-    turned = turned_upright(mask, tilt)
+    tilt, iou = _refined_axis(mask, _downscale(mask), long_tilt if across else long_tilt + 90.0)
+    turned = rotate_upright(mask, tilt)
     column, _ = _best_column(turned)
     return replace(silhouette, axis_tilt_deg=tilt, axis_column_px=column, mirror_iou=iou, row_fill=_row_fill(turned))
 
 
-def turned_upright(image: np.ndarray, tilt_deg: float) -> np.ndarray:
+def rotate_upright(image: np.ndarray, tilt_deg: float) -> np.ndarray:
     """Rotate an image or mask by ``-tilt_deg`` about its centre into a square that contains all of it."""
     height, width = image.shape[:2]
-    matrix = turning(height, width, tilt_deg)
+    matrix = upright_transform(height, width, tilt_deg)
     side = upright_side(height, width)
     values = image.astype(np.float32) if image.dtype == bool else image
     turned = cv2.warpAffine(values, matrix, (side, side), flags=cv2.INTER_LINEAR)
@@ -111,7 +111,7 @@ def upright_side(height: int, width: int) -> int:
     return int(np.ceil(np.hypot(height, width))) + 4
 
 
-def turning(height: int, width: int, tilt_deg: float) -> np.ndarray:
+def upright_transform(height: int, width: int, tilt_deg: float) -> np.ndarray:
     """Return the affine map (2, 3) from pixels (x, y) of the crop to those of the upright square."""
     side = upright_side(height, width)
     matrix = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), tilt_deg, 1.0)
@@ -144,10 +144,10 @@ def _ellipse_iou(mask: np.ndarray) -> float:
 
 def _mirror_axis(mask: np.ndarray, long_tilt: float) -> tuple[float, float]:
     """Find the tilt with the best mirror symmetry: upright, along or across the principal axis, then refined."""
-    small = _made_small(mask)
+    small = _downscale(mask)
 
     def agreement(tilt: float) -> float:
-        return _best_column(turned_upright(small, tilt))[1]
+        return _best_column(rotate_upright(small, tilt))[1]
 
     # the upright axis is preferred unless others are clearly better, because most photos show upright objects
     starts = {0.0: 0.012, long_tilt: 0.0, long_tilt + 90.0: -0.02}
@@ -158,19 +158,19 @@ def _refined_axis(mask: np.ndarray, small: np.ndarray, best: float) -> tuple[flo
     """Return the tilt near ``best`` with the best mirror symmetry, first at low and then at full resolution, and its overlap."""
 
     def agreement(tilt: float) -> float:
-        return _best_column(turned_upright(small, tilt))[1]
+        return _best_column(rotate_upright(small, tilt))[1]
 
     tilt = best
     for step in (4.0, 2.0, 1.0, 0.5):
         tilt = max((tilt - step, tilt, tilt + step), key=lambda t: (agreement(t), -abs(t - best)))
     if agreement(tilt) < agreement(best) + 0.004:
         tilt = best
-    exact = {t: _best_column(turned_upright(mask, t))[1] for t in (tilt - 0.25, tilt, tilt + 0.25)}
+    exact = {t: _best_column(rotate_upright(mask, t))[1] for t in (tilt - 0.25, tilt, tilt + 0.25)}
     tilt = max(exact, key=lambda t: (exact[t], -abs(t - tilt)))
     return (tilt + 90.0) % 180.0 - 90.0, exact[tilt]
 
 
-def _made_small(mask: np.ndarray) -> np.ndarray:
+def _downscale(mask: np.ndarray) -> np.ndarray:
     scale = _SEARCH_SIDE_PX / max(mask.shape)
     small = cv2.resize(mask.astype(np.float32), None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     return np.asarray(small > 0.5)

@@ -14,16 +14,16 @@ from scipy import ndimage
 
 from manitwin.models.generators.lift.surface import LiftedSurface, cut_below, tip_angle_deg
 
-REACHES = (0.0, 0.03, 0.06, 0.09, 0.12)
+FOOT_HEIGHT_SHARES = (0.0, 0.03, 0.06, 0.09, 0.12)
 """Heights above the lowest point, as shares of the total height, up to which a part counts as a foot; tried in turn."""
 SOLE_SHARE = 0.02
 """Height of a sole at the end of a foot, as a share of the total height."""
-DEEPER = (1.0, 1.5, 2.0, 2.5, 3.0)
+SOLE_DEPTH_FACTORS = (1.0, 1.5, 2.0, 2.5, 3.0)
 """Factors on the depth of the soles, tried in turn: a foot is longer than it looks from the front."""
 LEAST_SOLE_PX = 2.0
 
 
-def on_soles(
+def inflate_on_soles(
     mask: np.ndarray, inflated: Callable[[np.ndarray], LiftedSurface], least_angle_deg: float
 ) -> LiftedSurface | None:
     """Return the inflation of ``mask (H, W) bool`` with its feet on the ground; None if it would still tip over.
@@ -32,18 +32,18 @@ def on_soles(
     """
     rows = np.nonzero(mask.any(axis=1))[0]
     height = int(rows[-1] - rows[0]) + 1
-    for reach in REACHES:
-        footed = with_soles(mask, reach)
+    for reach in FOOT_HEIGHT_SHARES:
+        footed = extend_feet(mask, reach)
         whole = inflated(footed)
-        body = cut_below(_of_picture(whole, footed.shape[0], mask.shape[0]), 1, -float(rows[-1]) - 0.5)
-        for deeper in DEEPER:
-            standing = _deepened(body, deeper, max(reach, SOLE_SHARE) * height)
+        body = cut_below(_convert_uv(whole, footed.shape[0], mask.shape[0]), 1, -float(rows[-1]) - 0.5)
+        for deeper in SOLE_DEPTH_FACTORS:
+            standing = _deepen_feet(body, deeper, max(reach, SOLE_SHARE) * height)
             if tip_angle_deg(standing) >= least_angle_deg:
                 return standing
     return None
 
 
-def with_soles(mask: np.ndarray, reach: float) -> np.ndarray:
+def extend_feet(mask: np.ndarray, reach: float) -> np.ndarray:
     """Return ``mask (H, W) bool`` with its feet extended to the lowest row and below the picture, ``(H + h, W)``.
 
     Feet are the parts in the lowest ``reach`` of the height; of each, the columns that end in its lowest part are extended.
@@ -66,14 +66,14 @@ def with_soles(mask: np.ndarray, reach: float) -> np.ndarray:
     return footed
 
 
-def _of_picture(surface: LiftedSurface, made_rows: int, rows: int) -> LiftedSurface:
+def _convert_uv(surface: LiftedSurface, made_rows: int, rows: int) -> LiftedSurface:
     """Convert texture coordinates from a picture with ``made_rows`` to its upper ``rows``."""
     uv = surface.uv.copy()
     uv[:, 1] = 1 - (1 - uv[:, 1]) * made_rows / rows
     return replace(surface, uv=uv)
 
 
-def _deepened(surface: LiftedSurface, deeper: float, reach_px: float) -> LiftedSurface:
+def _deepen_feet(surface: LiftedSurface, deeper: float, reach_px: float) -> LiftedSurface:
     """Scale the depth of the lowest ``reach_px`` gradually by ``deeper``, up to the depth of the whole surface."""
     if deeper == 1.0:
         return surface

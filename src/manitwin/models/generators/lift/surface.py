@@ -18,7 +18,7 @@ TILTED_TIP_ANGLE_DEG = 15.0  # an object that does not stand in the photo must b
 _CUTS = (0.015, 0.03, 0.05, 0.08)  # shares of the height at which a flat base is tried
 # up to where both head and handle of a thin object with a thick head touch the ground
 _LYING_CUTS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3)
-LYING = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
+UPRIGHT_TO_LYING = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
 """Rotation that turns the direction towards the camera up: (x, y, z) -> (x, z, -y)."""
 
 
@@ -36,7 +36,7 @@ class LiftedSurface:
     uv: np.ndarray
     facing: np.ndarray
 
-    def seen(self) -> np.ndarray:
+    def visible_faces(self) -> np.ndarray:
         """Return for each face (F,) whether the photo shows it; faces with a corner at a grazing angle count as unseen."""
         return np.asarray(self.facing[self.faces].min(axis=1) > GRAZING_COSINE)
 
@@ -54,7 +54,7 @@ def unseen_share(surface: LiftedSurface) -> float:
     """Return the share of the area that the photo does not show."""
     a, b, c = (surface.vertices[surface.faces[:, corner]] for corner in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return float(areas[~surface.seen()].sum() / areas.sum())
+    return float(areas[~surface.visible_faces()].sum() / areas.sum())
 
 
 def to_manifold(surface: LiftedSurface) -> manifold3d.Manifold:
@@ -107,7 +107,9 @@ def center_of_volume(surface: LiftedSurface) -> np.ndarray:
     return (corners.sum(axis=1) * volumes[:, None]).sum(axis=0) / (4 * volumes.sum())
 
 
-def stood(surface: LiftedSurface, least_angle_deg: float, cuts: tuple[float, ...] = _CUTS) -> LiftedSurface | None:
+def cut_standing_base(
+    surface: LiftedSurface, least_angle_deg: float, cuts: tuple[float, ...] = _CUTS
+) -> LiftedSurface | None:
     """Cut the smallest flat base with which the solid stands (along y); None if it tips over with all cuts."""
     low, height = surface.vertices[:, 1].min(), float(np.ptp(surface.vertices[:, 1]))
     for share in cuts:
@@ -117,22 +119,22 @@ def stood(surface: LiftedSurface, least_angle_deg: float, cuts: tuple[float, ...
     return None
 
 
-def laid(surface: LiftedSurface) -> LiftedSurface:
+def lay_on_back(surface: LiftedSurface) -> LiftedSurface:
     """Lay a relief with a flat back on that back, front upward."""
-    return surface.moved(LYING, np.zeros(3))
+    return surface.moved(UPRIGHT_TO_LYING, np.zeros(3))
 
 
-def laid_round(surface: LiftedSurface) -> LiftedSurface:
+def lay_on_facet(surface: LiftedSurface) -> LiftedSurface:
     """Lay a round solid down, front upward, with a facet along its underside so that it does not roll."""
-    lying = laid(surface)
-    flattened = stood(lying, UPRIGHT_TIP_ANGLE_DEG, _LYING_CUTS)
+    lying = lay_on_back(surface)
+    flattened = cut_standing_base(lying, UPRIGHT_TIP_ANGLE_DEG, _LYING_CUTS)
     if flattened is not None:
         return flattened
     low, height = lying.vertices[:, 1].min(), float(np.ptp(lying.vertices[:, 1]))
     return cut_below(lying, 1, low + _LYING_CUTS[-1] * height)
 
 
-def squared(surface: LiftedSurface) -> LiftedSurface:
+def align_footprint(surface: LiftedSurface) -> LiftedSurface:
     """Rotate a lying object about the vertical, by at most 45 degrees, so that its sides seen from above are along x and z.
 
     A photo shows a lying object at any angle; after the rotation, extents along the axes are its length and width.

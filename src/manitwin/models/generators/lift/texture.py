@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from manitwin.models.generators.bleeding import bled
-from manitwin.models.generators.lift.silhouette import Silhouette, turned_upright, turning
+from manitwin.models.generators.bleeding import bleed_colours
+from manitwin.models.generators.lift.silhouette import Silhouette, rotate_upright, upright_transform
 
 MAX_SIDE_PX = 1024
 _MARGIN = 0.06
@@ -58,10 +58,10 @@ def crop_object(rgba: np.ndarray, mask_side_px: int) -> Crop:
     colours, alpha = _scaled(box, MAX_SIDE_PX)
     _, small = _scaled(box, mask_side_px)
     place = int(columns[0]) - margin, int(rows[0]) - margin, box.shape[1], box.shape[0]
-    return Crop(bled(colours, alpha > 127), _cleaned(small > 127), place)
+    return Crop(bleed_colours(colours, alpha > 127), _cleaned(small > 127), place)
 
 
-def beside(
+def place_beside(
     first: np.ndarray, second: np.ndarray, uv: np.ndarray, on_second: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Place a smaller picture to the right of a tall one, or below a wide one; both ``(H, W, 3) uint8``.
@@ -110,19 +110,19 @@ def paint_unseen(crop: Crop, axis: Silhouette | None) -> np.ndarray:
     height, width = crop.mask.shape
     photo = cv2.resize(crop.colours, (width, height), interpolation=cv2.INTER_AREA).astype(np.float32)
     if axis is None:
-        base = _voted(photo, crop.mask, _around(crop.mask))
+        base = _dominant_colours(photo, crop.mask, _neighbourhood_blur(crop.mask))
     else:
-        base = _of_rings(photo, crop.mask, axis)
+        base = _ring_colours(photo, crop.mask, axis)
     base = np.asarray(cv2.GaussianBlur(base, (0, 0), _SOFT_SHARE * max(height, width)))
     return np.clip(base + _rim_difference(photo, base, crop.mask) + 0.5, 0, 255).astype(np.uint8)
 
 
-def _voted(photo: np.ndarray, mask: np.ndarray, spread: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+def _dominant_colours(photo: np.ndarray, mask: np.ndarray, spread: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """Return for each place the mean of the colour class that dominates its surroundings.
 
     ``spread`` sums an image ``(H, W, C)`` over the surroundings of each place and may change its shape.
     """
-    kinds = _kinds(photo, mask)
+    kinds = _cluster_colours(photo, mask)
     sums = [spread(np.dstack([photo, np.ones_like(mask)]) * (kinds == kind)[..., None]) for kind in range(_COLOURS)]
     winner = np.argmax([each[..., 3] for each in sums], axis=0)
     chosen = np.take_along_axis(np.array(sums), winner[None, ..., None], axis=0)[0]
@@ -132,7 +132,7 @@ def _voted(photo: np.ndarray, mask: np.ndarray, spread: Callable[[np.ndarray], n
     return np.asarray(chosen[..., :3] / chosen[..., 3:], np.float32)
 
 
-def _kinds(photo: np.ndarray, mask: np.ndarray) -> np.ndarray:
+def _cluster_colours(photo: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """Return the nearest of a few colours for each pixel of the mask, -1 outside: k-means in L*a*b*.
 
     The initial centres are the median and then the colour farthest from the previous ones (Gonzalez 1985), which is
@@ -157,25 +157,25 @@ def _squares(points: np.ndarray, centres: np.ndarray) -> np.ndarray:
     return np.asarray(((points[:, None] - centres) ** 2).sum(axis=2))
 
 
-def _around(mask: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+def _neighbourhood_blur(mask: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     sigma = _AROUND_SHARE * max(mask.shape)
     return lambda image: np.asarray(cv2.GaussianBlur(image.astype(np.float32), (0, 0), sigma))
 
 
-def _of_rings(photo: np.ndarray, mask: np.ndarray, axis: Silhouette) -> np.ndarray:
+def _ring_colours(photo: np.ndarray, mask: np.ndarray, axis: Silhouette) -> np.ndarray:
     """Return the colours voted by the rows around each row across the axis."""
     height, width = mask.shape
-    upright = np.asarray(turned_upright(photo, axis.axis_tilt_deg))
-    inside = turned_upright(mask, axis.axis_tilt_deg)
+    upright = np.asarray(rotate_upright(photo, axis.axis_tilt_deg))
+    inside = rotate_upright(mask, axis.axis_tilt_deg)
     sigma = _RING_SHARE * int(inside.any(axis=1).sum())
 
     def along_axis(image: np.ndarray) -> np.ndarray:
         rows = image.sum(axis=1, keepdims=True, dtype=float)
         return np.asarray(ndimage.gaussian_filter1d(rows, sigma, axis=0, mode="constant"))
 
-    column = _voted(upright, inside, along_axis)
+    column = _dominant_colours(upright, inside, along_axis)
     striped = np.repeat(column, upright.shape[1], axis=1)
-    back = turning(height, width, axis.axis_tilt_deg)
+    back = upright_transform(height, width, axis.axis_tilt_deg)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return np.asarray(cv2.warpAffine(striped, back, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE))
 

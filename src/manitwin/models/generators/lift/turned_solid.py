@@ -20,20 +20,20 @@ from manitwin.models.generators.lift.revolution import (
     ROUND_ENDS_DEG,
     end_elevations,
     half_widths,
-    turned_from,
+    largest_profile,
 )
 from manitwin.models.generators.lift.silhouette import CROP_SIDE_PX
 from manitwin.models.generators.lift.texture import crop_object
-from manitwin.models.generators.templates.fitting.evidence import Evidence, evidence_of
-from manitwin.models.generators.templates.fitting.fit import Fitted, first_built
-from manitwin.models.generators.templates.fitting.least_squares import Placed, Problem
+from manitwin.models.generators.templates.fitting.evidence import Evidence, extract_evidence
+from manitwin.models.generators.templates.fitting.fit import TemplateFit, first_solid_fit
+from manitwin.models.generators.templates.fitting.least_squares import PlacedView, Problem
 from manitwin.models.generators.templates.fitting.residual import residual
 from manitwin.models.generators.templates.fitting.search import Candidate, steep_cost
-from manitwin.models.generators.templates.fitting.shape import Family
-from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View, boxed
+from manitwin.models.generators.templates.fitting.shape import ShapeFamily
+from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View, frame_placement
 from manitwin.models.generators.templates.template import Measure, Model, Template
 
-UPRIGHT = "can"
+UPRIGHT_CATEGORY = "can"
 """A category of standing, round objects, whose resting pose a body of revolution has."""
 STEPS_DEG = (0.0, 4.0, 8.0, 12.0, 16.0)
 """Steps below the elevation of the hull; for 54 photos of templates from 10, 30 and 55 degrees it is 0 to 16 degrees too high."""
@@ -56,19 +56,19 @@ class _Start:
     elevation_deg: float
 
 
-def turned_solid(rgba: np.ndarray, focal_mm: float | None = None) -> Fitted | None:
+def turned_solid(rgba: np.ndarray, focal_mm: float | None = None) -> TemplateFit | None:
     """Return the body of revolution about the vertical that explains ``rgba (H, W, 4) uint8``, whose alpha is the mask.
 
     None if no profile gives a solid. ``focal_mm`` is the 35 mm equivalent focal length, if known.
     """
     tilted, level = _starts(crop_object(rgba, CROP_SIDE_PX).mask)
-    evidence = evidence_of(rgba, focal_mm)
+    evidence = extract_evidence(rgba, focal_mm)
     found = [
-        min(candidates, key=_unexplained)
+        min(candidates, key=_outline_cost)
         for starts in (tilted, level)
-        if (candidates := [each for start in starts if (each := _refined(start, evidence)) is not None])
+        if (candidates := [each for start in starts if (each := _fit_from_start(start, evidence)) is not None])
     ]
-    return first_built(sorted(found, key=lambda each: each.residual.cost), evidence)
+    return first_solid_fit(sorted(found, key=lambda each: each.residual.cost), evidence)
 
 
 def _starts(mask: np.ndarray) -> tuple[list[_Start], list[_Start]]:
@@ -80,15 +80,15 @@ def _starts(mask: np.ndarray) -> tuple[list[_Start], list[_Start]]:
     is_level = not elevations or min(upper, lower) <= LEVEL_DEG or upper > ROUND_ENDS_DEG
 
     def at(elevation_deg: float) -> list[_Start]:
-        turned = turned_from(rows, widths, column_px, 0.0 if elevation_deg <= LEVEL_DEG else elevation_deg)
+        turned = largest_profile(rows, widths, column_px, 0.0 if elevation_deg <= LEVEL_DEG else elevation_deg)
         if len(turned.heights) < LEAST_SAMPLES:
             return []
-        return [_Start(_with_corners(turned.heights, turned.radii), elevation_deg)]
+        return [_Start(_simplify_profile(turned.heights, turned.radii), elevation_deg)]
 
     return [start for each in elevations for start in at(each)], at(LEVEL_START_DEG) if is_level else []
 
 
-def _with_corners(heights: np.ndarray, radii: np.ndarray) -> np.ndarray:
+def _simplify_profile(heights: np.ndarray, radii: np.ndarray) -> np.ndarray:
     """Return a profile simplified to a polyline with few corners ``(K, 2)``, upward (Douglas and Peucker 1973)."""
     points = np.column_stack([heights, radii]).astype(np.float32)[:, None]
     tolerance = CORNER_SHARE * float(np.ptp(heights))
@@ -97,7 +97,7 @@ def _with_corners(heights: np.ndarray, radii: np.ndarray) -> np.ndarray:
     return np.asarray(corners, float)
 
 
-def _family(profile: np.ndarray) -> Family:
+def _family(profile: np.ndarray) -> ShapeFamily:
     """Return the family of bodies with corners at the heights of a profile ``(K, 2)``, upward, and radii near its radii."""
     height = float(profile[-1, 0] - profile[0, 0])
     levels, radii = (profile[:, 0] - profile[0, 0]) / height, np.maximum(profile[:, 1] / height, _AXIS)
@@ -110,10 +110,10 @@ def _family(profile: np.ndarray) -> Family:
         across = np.maximum([width * shares[name] for name in names], _AXIS)
         return Model().add("body", lathe(height_m * np.column_stack([across, levels])))
 
-    return Family(Template(UPRIGHT, "household", measures, {"body": ("cardboard",)}, build))
+    return ShapeFamily(Template(UPRIGHT_CATEGORY, "household", measures, {"body": ("cardboard",)}, build))
 
 
-def _refined(start: _Start, evidence: Evidence) -> Candidate | None:
+def _fit_from_start(start: _Start, evidence: Evidence) -> Candidate | None:
     """Return the least-squares fit from a start; None if it gives no solid."""
     try:
         family = _family(start.profile)
@@ -125,10 +125,10 @@ def _refined(start: _Start, evidence: Evidence) -> Candidate | None:
         return None
     perspective = float(np.clip(evidence.perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE))
     ahead = View(0.0, float(np.radians(start.elevation_deg)), 0.0, perspective)
-    scale, x, y = boxed(ahead.project(solid.vertices)[0])
+    scale, x, y = frame_placement(ahead.project(solid.vertices)[0])
     view = View(0.0, ahead.elevation_rad, 0.0, perspective, scale, x, y)
     at, (placed,) = Problem(family, [evidence], True).solve(
-        spreads, [Placed(view, True)], measures=True, rounds=_ROUNDS, enough=_ENOUGH
+        spreads, [PlacedView(view, True)], measures=True, rounds=_ROUNDS, enough=_ENOUGH
     )
     final = family.solid(at)
     if final is None:
@@ -136,6 +136,6 @@ def _refined(start: _Start, evidence: Evidence) -> Candidate | None:
     return Candidate(family, at, placed.view, True, residual(final, placed.view, evidence))
 
 
-def _unexplained(candidate: Candidate) -> float:
+def _outline_cost(candidate: Candidate) -> float:
     """Return the cost of silhouette and edges; shading separates a body from other shapes, but not its elevation."""
     return candidate.residual.outline_cost + steep_cost(candidate.view)

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from scipy.optimize import minimize
 
-from manitwin.models.generators.lift.pinhole import Sight, passing_px, signed_distance
+from manitwin.models.generators.lift.pinhole import PinholeSilhouette, mean_ray_miss_px, signed_distance
 
 SIDE_PX = 160
 """Longest side of the silhouettes' bounding boxes during calibration."""
@@ -48,7 +48,7 @@ class TurntableCamera:
     cost_px: float
 
     def matrix(self, turn_deg: float, width_px: float, height_px: float) -> np.ndarray:
-        """Return the projection ``(3, 4)`` of a ``Sight`` to a picture of that size, with the object seen from ``turn_deg``."""
+        """Return the projection ``(3, 4)`` of a ``PinholeSilhouette`` to a picture of that size, seen from ``turn_deg``."""
         turn, elevation = np.deg2rad([turn_deg, self.elevation_deg])
         toward = np.array([np.sin(turn) * np.cos(elevation), -np.cos(turn) * np.cos(elevation), np.sin(elevation)])
         right = np.array([np.cos(turn), np.sin(turn), 0.0])
@@ -84,13 +84,15 @@ def scaled_masks(photos: Sequence[np.ndarray], side_px: int) -> list[ScaledMask]
     return found
 
 
-def sights_of(masks: Sequence[ScaledMask], camera: TurntableCamera, turns_deg: Sequence[float]) -> list[Sight]:
-    """Return the silhouettes as ``Sight`` of the camera at the turns."""
-    plain = [_unplaced(mask) for mask in masks]
-    return _seen_by(plain, masks, camera, turns_deg)
+def pinhole_silhouettes(
+    masks: Sequence[ScaledMask], camera: TurntableCamera, turns_deg: Sequence[float]
+) -> list[PinholeSilhouette]:
+    """Return the silhouettes as ``PinholeSilhouette`` of the camera at the turns."""
+    plain = [_without_camera(mask) for mask in masks]
+    return _with_turntable_camera(plain, masks, camera, turns_deg)
 
 
-def calibrated(
+def calibrate_turntable(
     photos: Sequence[np.ndarray], turns_deg: Sequence[float], focal_mm: float | None = None
 ) -> TurntableCamera:
     """Estimate the fixed camera for matted ``photos (H, W, 4) uint8``, all of the same size, of a turning object.
@@ -98,10 +100,10 @@ def calibrated(
     ``turns_deg`` are those of the camera about the vertical, counter-clockwise; ``focal_mm`` is the 35 mm equivalent focal
     length, if stated. Of many photos a subset spread over the turns is used.
     """
-    chosen = _spread(turns_deg)
+    chosen = _select_spread_photos(turns_deg)
     masks = scaled_masks([photos[k] for k in chosen], SIDE_PX)
     turns = [turns_deg[k] for k in chosen]
-    plain = [_unplaced(mask) for mask in masks]
+    plain = [_without_camera(mask) for mask in masks]
     usual, weight = _USUAL_FOCAL, _FOCAL_WEIGHT
     if focal_mm is not None:
         usual, weight = focal_mm / _FULL_FRAME_MM, _STATED_FOCAL_WEIGHT
@@ -116,7 +118,7 @@ def calibrated(
         outside = max(LEAST_ELEVATION_DEG - tried.elevation_deg, tried.elevation_deg - MOST_ELEVATION_DEG, 0.0)
         outside += 10 * max(float(np.log(LEAST_FOCAL) - at[1]), float(at[1] - np.log(MOST_FOCAL)), 0.0)
         return (
-            passing_px(_seen_by(plain, masks, tried, turns))
+            mean_ray_miss_px(_with_turntable_camera(plain, masks, tried, turns))
             + outside
             + weight * ((at[1] - np.log(usual)) / _FOCAL_SPREAD) ** 2
         )
@@ -133,24 +135,27 @@ def calibrated(
     best = min(found, key=lambda each: float(each.fun)).x
     told = camera(best)
     return TurntableCamera(
-        told.elevation_deg, told.focal, told.axis_share, passing_px(_seen_by(plain, masks, told, turns))
+        told.elevation_deg,
+        told.focal,
+        told.axis_share,
+        mean_ray_miss_px(_with_turntable_camera(plain, masks, told, turns)),
     )
 
 
-def _unplaced(mask: ScaledMask) -> Sight:
-    return Sight(signed_distance(mask.mask), mask.corner, np.zeros((3, 4)), 1.0)
+def _without_camera(mask: ScaledMask) -> PinholeSilhouette:
+    return PinholeSilhouette(signed_distance(mask.mask), mask.corner, np.zeros((3, 4)), 1.0)
 
 
-def _seen_by(
-    plain: Sequence[Sight], masks: Sequence[ScaledMask], camera: TurntableCamera, turns_deg: Sequence[float]
-) -> list[Sight]:
+def _with_turntable_camera(
+    plain: Sequence[PinholeSilhouette], masks: Sequence[ScaledMask], camera: TurntableCamera, turns_deg: Sequence[float]
+) -> list[PinholeSilhouette]:
     return [
-        sight.seen_from(camera.matrix(turn, *mask.size_px), camera.focal * max(mask.size_px))
+        sight.with_camera(camera.matrix(turn, *mask.size_px), camera.focal * max(mask.size_px))
         for sight, mask, turn in zip(plain, masks, turns_deg, strict=True)
     ]
 
 
-def _spread(turns_deg: Sequence[float]) -> list[int]:
+def _select_spread_photos(turns_deg: Sequence[float]) -> list[int]:
     order = sorted(range(len(turns_deg)), key=lambda k: (turns_deg[k] % 360.0, k))
     if len(order) <= _PHOTOS:
         return sorted(order)

@@ -13,12 +13,12 @@ import numpy as np
 from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import SolidError, coarser, union
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.descriptions import article
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.annotators.priors import load_priors
-from manitwin.models.annotators.words import article
 from manitwin.models.generators.lift.hint import hint_from_name
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.fitting.fit import kinds_of, template_for
+from manitwin.models.generators.templates.fitting.fit import alternative_categories, template_for
 from manitwin.models.generators.templates.template import Template
 
 LEAST_TURNED_SHARE = 0.86
@@ -29,8 +29,8 @@ handles and spouts have 0.87 to 0.98, the others 0.86 or less.
 """
 _LEVELS, _SIDE_PX = 24, 96
 _COARSE = 0.6
-_ROUND_ABOUT = ((0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (0.0, 90.0, 0.0))
-_NEVER_TURNED = frozenset({"two", "frame", "arc", "pistol", "seat", "legs", "bag"})
+_AXIS_ROTATIONS_DEG = ((0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (0.0, 90.0, 0.0))
+_NON_REVOLUTION_SHAPES = frozenset({"two", "frame", "arc", "pistol", "seat", "legs", "bag"})
 """Words of a prior's shape that exclude a body of revolution."""
 MARGIN = 2.0
 """Maximum factor by which a proportion may exceed the range of the template's measures.
@@ -45,32 +45,32 @@ Its surfaces then deviate by half of that; those of the 351 lifted objects devia
 """
 
 
-def why_never_turned(name: str | None) -> str | None:
+def revolution_conflict(name: str | None) -> str | None:
     """Return why an object of this name is no body of revolution, by its template or, without one, its prior; else None.
 
     An object that its prior calls round or cylindrical may be one whatever its template is, and so may an object whose shape
     word is shared with round templates (a basket is an open container, as a flower pot is), and an unknown one.
     """
-    prior = lookup(name)
+    prior = find_prior(name)
     if prior is None or hint_from_name(name).round:
         return None
-    meant = _meant(name)
+    meant = _possible_templates(name)
     if meant:
         alike = [category for category in load_templates() if load_priors()[category].shape == prior.shape]
-        if any(_is_turned(category) for category in [*(template.category for template in meant), *alike]):
+        if any(_is_revolution(category) for category in [*(template.category for template in meant), *alike]):
             return None
-    elif not _NEVER_TURNED & set(prior.shape.replace("-", " ").replace(",", " ").split()):
+    elif not _NON_REVOLUTION_SHAPES & set(prior.shape.replace("-", " ").replace(",", " ").split()):
         return None
     return f"a round thing would have its outline, but {article(prior.category)} {prior.category} is not round"
 
 
-def why_other_proportions(name: str | None, extents: np.ndarray, *, turned: bool = False) -> str | None:
+def proportion_conflict(name: str | None, extents: np.ndarray, *, turned: bool = False) -> str | None:
     """Return why sides ``(3,)`` are impossible for all objects of this name's template; None if they are possible.
 
     A body of revolution (``turned``) never looks longer than it is, so it may be as long as it looks. Names that are not the
     template's own (a boot is a kind of shoe) and objects of arbitrary proportions are not tested.
     """
-    meant = _meant(name)
+    meant = _possible_templates(name)
     if not meant or not _is_own_name(meant[0], name) or any(template.any_proportions for template in meant):
         return None
     found = _ratios(np.asarray(extents, float))
@@ -90,13 +90,13 @@ def why_other_proportions(name: str | None, extents: np.ndarray, *, turned: bool
     return None
 
 
-def _meant(name: str | None) -> list[Template]:
+def _possible_templates(name: str | None) -> list[Template]:
     """Return the templates that a name may mean, its own first; empty without one."""
     template = template_for(name)
     if template is None:
         return []
     templates = load_templates()
-    return [template, *(templates[kind] for kind in kinds_of(template.category, name))]
+    return [template, *(templates[kind] for kind in alternative_categories(template.category, name))]
 
 
 def _is_own_name(template: Template, name: str | None) -> bool:
@@ -114,7 +114,7 @@ def _ratios(extents: np.ndarray) -> np.ndarray:
 def _usual_ratios(category: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the minimum and maximum ``_ratios`` of a template with typical measures, varying one at a time to its limits."""
     template = load_templates()[category]
-    usual = template.typical()
+    usual = template.typical_measures()
     tried = [usual]
     for name, measure in template.measures.items():
         tried += [usual | {name: measure.low}, usual | {name: measure.high}]
@@ -130,15 +130,15 @@ def _usual_ratios(category: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def _is_turned(category: str) -> bool:
+def _is_revolution(category: str) -> bool:
     """Tell whether a template with typical measures is round about one of its axes, apart from handles and spouts."""
     template = load_templates()[category]
     with coarser(_COARSE):
-        whole = union([solid for _, solid in template.build(**template.typical()).assembly.solids()])
-    return max(turned_share(whole.rotate(turn)) for turn in _ROUND_ABOUT) >= LEAST_TURNED_SHARE
+        whole = union([solid for _, solid in template.build(**template.typical_measures()).assembly.solids()])
+    return max(revolution_share(whole.rotate(turn)) for turn in _AXIS_ROTATIONS_DEG) >= LEAST_TURNED_SHARE
 
 
-def turned_share(solid: Manifold) -> float:
+def revolution_share(solid: Manifold) -> float:
     """Return the share of a solid, with holes filled, within the largest disc of each of its level sections."""
     low, high = np.reshape(solid.bounding_box(), (2, 3))
     scale = (_SIDE_PX - 8) / float((high - low)[:2].max())

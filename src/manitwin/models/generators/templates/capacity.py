@@ -9,8 +9,8 @@ from manifold3d import CrossSection, Manifold, OpType
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import load_materials, load_priors
-from manitwin.models.generators.templates.made import Made
 from manitwin.models.generators.templates.stated_amounts import Amount
+from manitwin.models.generators.templates.template_object import TemplateObject
 
 CLOSED_WALLS_M = {"glass": 0.003, "plastic": 0.0005, "aluminium": 0.0001, "steel": 0.0003, "cardboard": 0.0005}
 """Wall thickness of closed containers by surface material: glass bottles and jars 2 to 4 mm, PET 0.3 to 0.7, cans 0.1 to 0.3,
@@ -26,7 +26,7 @@ LEAST, MOST = 1e-9, 1e3
 """Bounds on volume (m^3) and mass (kg); no scale is searched for values outside."""
 
 
-def capacity_m3(made: Made) -> float | None:
+def capacity_m3(made: TemplateObject) -> float | None:
     """Return the capacity of an object: the volume below the lowest point of its rim, or inside the walls of a closed container.
 
     None for an object that is no container, and for a container without a cavity.
@@ -44,7 +44,7 @@ def capacity_m3(made: Made) -> float | None:
     return sum(hollows_m2) * step_m or None
 
 
-def held_m3(made: Made, amount: Amount) -> float:
+def require_capacity_m3(made: TemplateObject, amount: Amount) -> float:
     """Return ``capacity_m3`` of an object whose volume is stated as an ``amount``; raises UsageError if it is no container."""
     held = capacity_m3(made)
     if held is None:
@@ -54,7 +54,7 @@ def held_m3(made: Made, amount: Amount) -> float:
     return held
 
 
-def _closed_wall_m(made: Made) -> float:
+def _closed_wall_m(made: TemplateObject) -> float:
     """Return the wall thickness (m) of a closed container; raises UsageError if it is unknown for its material."""
     if made.category == "thermos":
         return TWO_WALLS_M
@@ -82,7 +82,7 @@ def _area_m2(loop: np.ndarray) -> float:
     return 0.5 * float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
 
 
-def scale_with(amount: Amount, made_at: Callable[[float], Made]) -> float:
+def solve_scale(amount: Amount, made_at: Callable[[float], TemplateObject]) -> float:
     """Return the scale at which the object of ``made_at(scale)`` has a stated volume or mass.
 
     The search is iterative, since walls and sheets keep their thickness. Raises UsageError for a volume of an object that is no
@@ -91,7 +91,7 @@ def scale_with(amount: Amount, made_at: Callable[[float], Made]) -> float:
     scale, wanted = 1.0, amount.mass_kg if amount.volume_m3 is None else amount.volume_m3
     for _ in range(MOST_ROUNDS):
         made = made_at(scale)
-        has = sum(made.masses_kg.values()) if amount.volume_m3 is None else held_m3(made, amount)
+        has = sum(made.masses_kg.values()) if amount.volume_m3 is None else require_capacity_m3(made, amount)
         if wanted is None or not LEAST < wanted < MOST:
             break
         if has > 0 and abs(has / wanted - 1) < CLOSE:

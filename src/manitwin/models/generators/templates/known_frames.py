@@ -8,8 +8,8 @@ import trimesh
 from manitwin.geometry.frames.feature import UP, rotation_of
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.models.generators.templates.made import Made
 from manitwin.models.generators.templates.template import KnownPoint
+from manitwin.models.generators.templates.template_object import TemplateObject
 from manitwin.twin.point_records import FunctionalFrame
 
 _TURNS = 48
@@ -20,7 +20,7 @@ _ROUND = 1.15  # maximum ratio of farthest to nearest wall of a round rim
 _HANDLES, _SPOUTS = ("handle", "grips"), ("spout",)
 
 
-def known_frame(made: Made, point: KnownPoint, center_of_mass_m: np.ndarray) -> FunctionalFrame:
+def known_frame(made: TemplateObject, point: KnownPoint, center_of_mass_m: np.ndarray) -> FunctionalFrame:
     """Return the frame of a known point in the object frame.
 
     Position and Z are those of the template; for a face, the position is its centre. X and the size follow from the faces of the
@@ -42,7 +42,7 @@ def known_frame(made: Made, point: KnownPoint, center_of_mass_m: np.ndarray) -> 
 
 
 def _extent(
-    made: Made, point: KnownPoint, position: np.ndarray, z: np.ndarray, center_of_mass_m: np.ndarray
+    made: TemplateObject, point: KnownPoint, position: np.ndarray, z: np.ndarray, center_of_mass_m: np.ndarray
 ) -> tuple[np.ndarray, float, bool]:
     """Return the X direction, the size, and whether the roll about Z is free."""
     longest = float(np.ptp(made.mesh.vertices, axis=0).max())
@@ -71,7 +71,7 @@ def _extent(
     return UP, float(np.sqrt(areas[facing].sum() / np.pi)), True
 
 
-def _face_center(made: Made, point: KnownPoint, position: np.ndarray, z: np.ndarray) -> np.ndarray:
+def _face_center(made: TemplateObject, point: KnownPoint, position: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Return the centre of the part's faces that lie in the plane of ``position`` and face along ``z``."""
     corners = made.mesh.vertices[made.mesh.faces[made.mesh.faces_of(point.part)]]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
@@ -81,7 +81,7 @@ def _face_center(made: Made, point: KnownPoint, position: np.ndarray, z: np.ndar
     return position if not facing.any() else np.asarray(areas[facing] @ centers[facing] / areas[facing].sum())
 
 
-def _walls_m(made: Made, position: np.ndarray, z: np.ndarray) -> np.ndarray:
+def _walls_m(made: TemplateObject, position: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Return the distances ``(48,)`` in metres to the walls around an opening or hole, just below its rim."""
     caster = RayCaster(trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False))
     basis = rotation_of(z)
@@ -103,7 +103,7 @@ def _along(walls: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.asarray(np.cos(turn) * basis[:, 0] + np.sin(turn) * basis[:, 1])
 
 
-def _pour_direction(made: Made, position: np.ndarray, z: np.ndarray) -> np.ndarray | None:
+def _pour_direction(made: TemplateObject, position: np.ndarray, z: np.ndarray) -> np.ndarray | None:
     for names, sign in ((_SPOUTS, 1.0), (_HANDLES, -1.0)):
         for name in names:
             if name in made.mesh.names:

@@ -223,9 +223,9 @@ SAME_MATERIAL = {
     "cement": "concrete", "ceramics": "ceramic", "earthen": "earthenware", "aluminium alloy": "aluminium",
     "solid silver": "sterling silver",
 }  # fmt: skip
-OF_PRECIOUS_METAL = {"silver": "sterling silver", "gold": "solid gold"}
+PRECIOUS_METALS = {"silver": "sterling silver", "gold": "solid gold"}
 """Colour words that name a metal after 'of': a goblet of silver."""
-SAID_OF = {"solid gold": "gold", "electronics": "plastic and electronics", "enamel": "enamelled steel"}
+MATERIAL_WORDING = {"solid gold": "gold", "electronics": "plastic and electronics", "enamel": "enamelled steel"}
 """Wording of a material if it differs from the name of its look: electronics are mixed, enamel is on steel."""
 USUAL_COLORS: dict[str, tuple[str, ...]] = {
     "ceramic": ("white", "red", "blue", "navy", "green", "yellow", "black"),
@@ -282,7 +282,7 @@ def color_of(word: str) -> tuple[float, float, float] | None:
     return _rgb(COLORS[name]) if name in COLORS else None
 
 
-def shaded(rgb: tuple[float, float, float], shade: str) -> tuple[float, float, float]:
+def apply_shade(rgb: tuple[float, float, float], shade: str) -> tuple[float, float, float]:
     """Return a colour lightened or darkened by a shade word."""
     amount = SHADES[shade]
     towards = np.ones(3) if amount > 0 else np.zeros(3)
@@ -305,5 +305,5 @@ def look_of(words: str) -> Look:
             return look
         rgb = color_of(parts[cut - 1]) if look is not None else None
         if look is not None and rgb is not None:
-            return look.colored(shaded(rgb, parts[0]) if cut == 2 else rgb)
+            return look.colored(apply_shade(rgb, parts[0]) if cut == 2 else rgb)
     raise ValueError(f"no look {words!r}")

@@ -6,7 +6,7 @@ from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_materials
 from manitwin.models.generators.templates.looks import MATERIALS, Look, material_of
 
-NO_MATTER_BEFORE = frozenset(
+NON_MATERIAL_HEADS = frozenset(
     {
         "coated",
         "plated",
@@ -26,8 +26,8 @@ NO_MATTER_BEFORE = frozenset(
     | {"wash", "care", "wool", "punch", "man", "scrap", "pattern", "patterned", "print", "printed", "recycling"}
 )
 """Words after a material name that show that the object is not made of it."""
-_NEVER_BEFORE_A_NAME = frozenset({"soap", "wax", "bristle", "electronics"})
-_WORKED_ON = {
+_NON_MATERIAL_WORDS = frozenset({"soap", "wax", "bristle", "electronics"})
+_WORKPIECE_MATERIALS = {
     "tools": frozenset(
         {"wood", "paper", "glass", "leather", "fabric", "cloth", "stone", "metal", "foam", "cork", "tin"}
     ),
@@ -37,7 +37,7 @@ _WORKED_ON = {
 _SOFT = frozenset({"textile", "wax"})
 
 
-def is_matter(word: str, look: Look, of: Prior) -> bool:
+def is_material_of_object(word: str, look: Look, of: Prior) -> bool:
     """Return whether a word before an object's name states its material: steel of a steel mug, but not wood of a wood saw.
 
     It does for usual materials of the object. It does not for soap, wax and soft materials on other objects, nor for the material
@@ -46,7 +46,7 @@ def is_matter(word: str, look: Look, of: Prior) -> bool:
     usual = surfaces_of(of)
     if look.surface in usual or is_food(of):
         return True
-    if word in _NEVER_BEFORE_A_NAME or word in _WORKED_ON.get(of.domain, ()):
+    if word in _NON_MATERIAL_WORDS or word in _WORKPIECE_MATERIALS.get(of.domain, ()):
         return False
     return look.surface not in _SOFT or bool(usual & {"textile", "leather"})
 
@@ -61,7 +61,7 @@ def is_composite(prior: Prior) -> bool:
     return not is_food(prior) and not {"and", "with"}.isdisjoint(prior.material.split())
 
 
-def looks_in(material: str) -> list[Look]:
+def looks_of_materials(material: str) -> list[Look]:
     """Return the looks of the materials in a prior's material text; metal stands for steel and aluminium."""
     words = material.replace(",", " ").replace("-", " ").split()
     looks, at = list[Look](), 0
@@ -80,5 +80,6 @@ def surfaces_of(prior: Prior) -> frozenset[str]:
     """Return the surface materials in a prior's material text."""
     words = prior.material.replace(",", " ").split()
     return frozenset(
-        {look.surface for look in looks_in(prior.material)} | {word for word in words if word in load_materials()}
+        {look.surface for look in looks_of_materials(prior.material)}
+        | {word for word in words if word in load_materials()}
     )

@@ -9,26 +9,26 @@ from difflib import get_close_matches
 from itertools import pairwise
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.prior_names import lookup, named, named_together
+from manitwin.models.annotators.prior_names import find_prior, named, prior_by_compound
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
-from manitwin.models.generators.templates.described import is_described, own_materials
+from manitwin.models.generators.templates.look_phrases import is_descriptive, material_words_in_name
 from manitwin.models.generators.templates.looks import color_of, look_of, material_of
 from manitwin.models.generators.templates.matter import is_food
 from manitwin.models.generators.templates.other_shapes import KIN_OF_ANOTHER_SHAPE, is_of_another_shape
 from manitwin.models.generators.templates.standard_sizes import is_size_code
 from manitwin.models.generators.templates.template import Template
-from manitwin.models.generators.templates.vocabulary import FILLER_WORDS, PURPOSE, RELATIVE, speaks_of_others
+from manitwin.models.generators.templates.vocabulary import FILLER_WORDS, PURPOSE, RELATIVE, is_other_object_start
 
-_BEHIND = (
+_DESCRIPTION_STARTERS = (
     frozenset({"of", "in", "from", "made", "that", "which", "painted", "colored", "coloured", ","})
     | {"labelled", "labeled", "marked", "called", "named"}
     | PURPOSE
 )
 """Words after a name that start its description."""
-_PARTED = frozenset({"of", "in", "from"})
+_CONTENT_PREPOSITIONS = frozenset({"of", "in", "from"})
 """Words after which contents or origin follow: a box of pencils is a box."""
-_SHOWN_AS = frozenset(
+_CLASSIFIER_NOUNS = frozenset(
     {"piece", "kind", "sort", "type", "style", "model", "photo", "picture", "image"}
     | {"rendering", "render", "twin", "replica", "roll", "bar", "tube", "stick", "sheet", "block", "cube"}
 )
@@ -87,7 +87,7 @@ _ADJECTIVES = frozenset(
     }
 )
 """Product adjectives after a name that are not part of it."""
-USED_ALIKE = 0.6
+LEAST_SHARED_FEATURES = 0.6
 """Minimum share of common functional features for an object of equal shape to be suggested."""
 _COUNTS = frozenset(
     {"two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "twenty", "dozen"}
@@ -127,12 +127,12 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
         name: template.category for template in templates.values() for name in (template.category, *template.names)
     }
     bare = {name: template for template in templates.values() for name in template.bare}
-    parted = next((at for at in range(1, len(words)) if _parts(words, at)), len(words))
-    shown = bool({*words[:parted]} & (_SHOWN_AS | _GROUPS | _COUNTS))
+    parted = next((at for at in range(1, len(words)) if _is_separator(words, at)), len(words))
+    shown = bool({*words[:parted]} & (_CLASSIFIER_NOUNS | _GROUPS | _COUNTS))
     other: Prior | None = None
     for end in range(len(words), 0, -1):
         tail = words[end:]
-        if tail and not _says_more(tail):
+        if tail and not _is_trailing_description(tail):
             continue
         for start in range(end):
             if words[start] in FILLER_WORDS or "," in words[start:end] or (start > parted and not shown):
@@ -141,49 +141,49 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
             prior = (
                 named(phrase)
                 or named(phrase.replace(" ", ""))
-                or (named_together(phrase) if end - start == 1 else None)
+                or (prior_by_compound(phrase) if end - start == 1 else None)
             )
-            if _says_how_it_looks(words, start, end, prior, names):
+            if _is_description_of_other(words, start, end, prior, names):
                 continue
             if is_of_another_shape(phrase, words[:start]):
-                raise UsageError(_no_category(text, words, templates))
+                raise UsageError(_unknown_object_message(text, words, templates))
             meant = [names.get(phrase)]
             if prior is not None:
                 meant += [prior.category, None if prior.category in KIN_OF_ANOTHER_SHAPE else prior.kin_of]
-            if phrase in bare and other is None and _is_alone(words[:start], tail, bare[phrase]):
+            if phrase in bare and other is None and _is_bare_name(words[:start], tail, bare[phrase]):
                 meant.append(bare[phrase].category)
             category = next((name for name in meant if name in templates), None)
             if category is None:
                 other = other or prior
                 continue
-            if other is not None and not _stands_for(other, category):
-                raise UsageError(_no_category(text, other.category.split(), templates))
-            _check_one_thing(text, words[:start], words[start:end], load_priors()[category], set(names))
+            if other is not None and not _is_substitute(other, category):
+                raise UsageError(_unknown_object_message(text, other.category.split(), templates))
+            _require_single_object(text, words[:start], words[start:end], load_priors()[category], set(names))
             own = _own_words(words[start:end], templates[category], load_priors()[category])
-            return NamedCategory(category, own, _without_counter(words[:start]), tail)
-    raise UsageError(_no_category(text, words, templates))
+            return NamedCategory(category, own, _remove_counter(words[:start]), tail)
+    raise UsageError(_unknown_object_message(text, words, templates))
 
 
-def _is_alone(before: Sequence[str], tail: Sequence[str], template: Template) -> bool:
+def _is_bare_name(before: Sequence[str], tail: Sequence[str], template: Template) -> bool:
     """Return whether the words around a bare name only describe appearance, with materials that are usual for the object."""
     usual = {look_of(choice).surface for choices in template.slots.values() for choice in choices if choice}
     looks = [look for word in (*before, *tail) if (look := material_of(word)) is not None]
-    said = all(word in FILLER_WORDS or word in RELATIVE or is_described(word) for word in before)
+    said = all(word in FILLER_WORDS or word in RELATIVE or is_descriptive(word) for word in before)
     return said and all(look.surface in usual for look in looks)
 
 
-def _says_more(tail: Sequence[str]) -> bool:
+def _is_trailing_description(tail: Sequence[str]) -> bool:
     """Return whether the words after a name describe it and are not part of the name: 'in red', 'A5', 'size 42'."""
     first, *rest = tail
-    if first in _BEHIND or speaks_of_others(tail, 0) or is_size_code(first):
+    if first in _DESCRIPTION_STARTERS or is_other_object_start(tail, 0) or is_size_code(first):
         return True
     if first == "size":  # 'size 42', but not 'king size bed'
-        return bool(rest) and (_says_more(rest) or rest[0] in RELATIVE)
+        return bool(rest) and (_is_trailing_description(rest) or rest[0] in RELATIVE)
     if any(character.isdigit() for character in first) and not _is_number(first):
         return True
     coated = bool(rest) and rest[0].endswith("ed") and _ADJECTIVE.fullmatch(rest[0]) is not None  # 'zinc plated'
-    if _is_number(first) or is_adjective(first) or coated or first in FILLER_WORDS or is_described(first):
-        return not rest or _says_more(rest)
+    if _is_number(first) or is_adjective(first) or coated or first in FILLER_WORDS or is_descriptive(first):
+        return not rest or _is_trailing_description(rest)
     return False
 
 
@@ -196,7 +196,7 @@ def _is_number(word: str) -> bool:
     return word.replace(".", "").isdigit()
 
 
-def _says_how_it_looks(
+def _is_description_of_other(
     words: Sequence[str], start: int, end: int, prior: Prior | None, names: Mapping[str, str]
 ) -> bool:
     """Return whether words that name an object describe the look or taste of a preceding one: glass of 'a bottle, green glass'.
@@ -210,27 +210,28 @@ def _says_how_it_looks(
     colored = color_of(phrase) is not None or (food and color_of(behind) is not None)
     if not (is_look or colored or (food and "," in before)):
         return False
-    ends = [at for at, word in enumerate(before) if word in _BEHIND - _PARTED - PURPOSE]
+    ends = [at for at, word in enumerate(before) if word in _DESCRIPTION_STARTERS - _CONTENT_PREPOSITIONS - PURPOSE]
     if colored:
-        telling = [at for at, word in enumerate(before) if word not in FILLER_WORDS and not is_described(word)]
+        telling = [at for at, word in enumerate(before) if word not in FILLER_WORDS and not is_descriptive(word)]
         ends += [at + 1 for at in telling[-1:]]
     return any(" ".join(before[first:last]) in names for last in ends for first in range(last))
 
 
-def _parts(words: Sequence[str], at: int) -> bool:
+def _is_separator(words: Sequence[str], at: int) -> bool:
     """Return whether a word separates an object from its contents or surroundings: 'full' in 'a cup full of tea'."""
-    return words[at] in _PARTED or speaks_of_others(words, at)
+    return words[at] in _CONTENT_PREPOSITIONS or is_other_object_start(words, at)
 
 
-def _without_counter(before: list[str]) -> list[str]:
+def _remove_counter(before: list[str]) -> list[str]:
     """Return the words before a name without its counter: red, of 'a pair of red pliers'."""
     at = next(
-        (at for at, (word, of) in enumerate(pairwise(before)) if of == "of" and word in _GROUPS | _SHOWN_AS), None
+        (at for at, (word, of) in enumerate(pairwise(before)) if of == "of" and word in _GROUPS | _CLASSIFIER_NOUNS),
+        None,
     )
     return before if at is None else before[:at] + before[at + 2 :]
 
 
-def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior, names: set[str]) -> None:
+def _require_single_object(text: str, before: list[str], name: list[str], prior: Prior, names: set[str]) -> None:
     """Raise UsageError if a text asks for several objects: a pair of pliers is one object, two forks are not."""
     words = [*before, *name]
     plural = name[-1].endswith("s") and named(name[-1].removesuffix("s")) is not None
@@ -256,7 +257,7 @@ def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior
         )
 
 
-def _stands_for(meant: Prior, category: str) -> bool:
+def _is_substitute(meant: Prior, category: str) -> bool:
     """Return whether objects of a category look like the meant ones and may be equally large."""
     prior = load_priors()[category]
     same = (
@@ -276,13 +277,13 @@ def _own_words(called: list[str], template: Template, prior: Prior) -> list[str]
         return colors
     known = {look_of(choice).material for choice in next(iter(template.slots.values())) if choice}
     own = [word for word in called[:-1] if (look := material_of(word)) is not None and look.material in known]
-    return own or own_materials(called, prior)
+    return own or material_words_in_name(called, prior)
 
 
-def _no_category(text: str, words: list[str], templates: Mapping[str, Template]) -> str:
+def _unknown_object_message(text: str, words: list[str], templates: Mapping[str, Template]) -> str:
     """Return the error message for an unknown object, with templates of equal shape or similarly spelt names."""
-    meant = lookup(" ".join(words))
-    alike = [] if meant is None else [name for name in templates if _is_used_alike(load_priors()[name], meant)]
+    meant = find_prior(" ".join(words))
+    alike = [] if meant is None else [name for name in templates if _has_similar_function(load_priors()[name], meant)]
     if alike:
         hint = f"; of its shape there are: {', '.join(alike[:4])}."
     else:
@@ -299,7 +300,7 @@ def _no_category(text: str, words: list[str], templates: Mapping[str, Template])
     return f"no template makes {text!r}{hint} There are {len(templates)} (docs/templates.md)"
 
 
-def _is_used_alike(one: Prior, other: Prior) -> bool:
+def _has_similar_function(one: Prior, other: Prior) -> bool:
     """Return whether two categories have one shape and nearly the same functional features."""
     ours, theirs = ({part.feature for part in prior.functional} for prior in (one, other))
-    return one.shape == other.shape and len(ours & theirs) >= USED_ALIKE * len(ours | theirs)
+    return one.shape == other.shape and len(ours & theirs) >= LEAST_SHARED_FEATURES * len(ours | theirs)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from manitwin.models.annotators.prior_names import singulars
-from manitwin.models.generators.templates.described import is_described
+from manitwin.models.generators.templates.look_phrases import is_descriptive
 from manitwin.models.generators.templates.vocabulary import FILLER_WORDS
 
 
@@ -49,7 +49,7 @@ _COMPOUNDS = _listed(
     """
 )
 """Compounds of a template's name that mean another object: a horse shoe is no shoe."""
-_PARTS_TOO = frozenset({"cap"})
+_PART_NAMES = frozenset({"cap"})
 """Names that mean an object alone, but a part or cover after another noun: a bottle cap is not for a head."""
 
 
@@ -58,5 +58,5 @@ def is_of_another_shape(phrase: str, before: Sequence[str]) -> bool:
     said = {*singulars(phrase)}
     if before and any(f"{before[-1]} {each}" in _COMPOUNDS for each in (phrase, *singulars(phrase))):
         return True
-    part = before and before[-1] not in FILLER_WORDS and not is_described(before[-1])
-    return not said.isdisjoint(_NAMES_OF_OTHERS) or bool(part and not said.isdisjoint(_PARTS_TOO))
+    part = before and before[-1] not in FILLER_WORDS and not is_descriptive(before[-1])
+    return not said.isdisjoint(_NAMES_OF_OTHERS) or bool(part and not said.isdisjoint(_PART_NAMES))

@@ -26,7 +26,7 @@ MARGIN = 2.0
 
 
 @dataclass(frozen=True)
-class Holds:
+class CapacityTarget:
     """A required capacity, its wording, and a function that computes the capacity from model, mesh and measures."""
 
     volume_m3: float
@@ -34,19 +34,19 @@ class Holds:
     capacity_m3: Callable[[Model, PartedMesh, Mapping[str, float]], float]
 
 
-def proportioned(
+def solve_proportions(
     template: Template,
     measures: Mapping[str, float],
     lengths_m: Mapping[str, float],
     part_lengths_m: Mapping[str, float],
-    holds: Holds | None = None,
+    holds: CapacityTarget | None = None,
 ) -> dict[str, float]:
-    """Return measures close to the given ones with which the object has the stated lengths; see ``_with_lengths``.
+    """Return measures close to the given ones with which the object has the stated lengths; see ``_solve_lengths``.
 
     For objects taller than long, length, width and height may be the sides by size, as is usual for luggage: 55 x 40 x 20 cm.
     """
     try:
-        return _with_lengths(template, measures, lengths_m, part_lengths_m, holds)
+        return _solve_lengths(template, measures, lengths_m, part_lengths_m, holds)
     except UsageError:
         if lengths_m.keys() != {"length", "width", "height"} or template.any_proportions:
             raise
@@ -54,15 +54,15 @@ def proportioned(
         if sides[Z] < sides[:Z].max():
             raise
         by_size = dict(zip(("height", "width", "depth"), sorted(lengths_m.values(), reverse=True), strict=True))
-        return _with_lengths(template, measures, by_size, part_lengths_m, holds)
+        return _solve_lengths(template, measures, by_size, part_lengths_m, holds)
 
 
-def _with_lengths(
+def _solve_lengths(
     template: Template,
     measures: Mapping[str, float],
     lengths_m: Mapping[str, float],
     part_lengths_m: Mapping[str, float],
-    holds: Holds | None,
+    holds: CapacityTarget | None,
 ) -> dict[str, float]:
     """Return measures close to the given ones with which the object has the stated lengths.
 
@@ -80,11 +80,11 @@ def _with_lengths(
     stated = [f"{_SPELT.get(name, name)} {length:g} m" for name, length in said_m] + ([holds.said] if holds else [])
     targets = np.array([length for _, length in said_m] + ([float(np.cbrt(holds.volume_m3))] if holds else []))
     if not ((targets > 0) & (targets < MOST_M)).all():
-        raise UsageError(_impossible(template, stated))
+        raise UsageError(_impossible_message(template, stated))
     sides = _sides_m(template, changed, part_lengths_m, holds)
-    said = [*_axes(sides, lengths_m, targets), *range(3, len(sides))]
+    said = [*_assign_axes(sides, lengths_m, targets), *range(3, len(sides))]
     if len(said) < len(targets):
-        raise UsageError(f"{_impossible(template, stated)}; leave one of them out")
+        raise UsageError(f"{_impossible_message(template, stated)}; leave one of them out")
     larger = float(np.exp(np.log(targets / sides[said]).mean()))
     for name in free:
         changed[name] *= larger if template.measures[name].unit == "m" else 1.0
@@ -104,10 +104,10 @@ def _with_lengths(
         for name, step in zip(free, steps, strict=True):
             changed[name] *= float(np.exp(step))
     remedy = "leave one of them out" if len(stated) > 1 else "say the length of the whole"
-    raise UsageError(f"{_impossible(template, stated)}; {remedy}")
+    raise UsageError(f"{_impossible_message(template, stated)}; {remedy}")
 
 
-def _axes(sides_m: np.ndarray, lengths_m: Mapping[str, float], targets_m: np.ndarray) -> list[int]:
+def _assign_axes(sides_m: np.ndarray, lengths_m: Mapping[str, float], targets_m: np.ndarray) -> list[int]:
     """Return an axis for each length: the assignment, among those allowed, that changes the shape least; empty if there is none.
 
     ``targets_m (K,)`` are the lengths followed by the other targets, whose current values follow the three extents in
@@ -128,7 +128,7 @@ def _axes(sides_m: np.ndarray, lengths_m: Mapping[str, float], targets_m: np.nda
 
 
 def _sides_m(
-    template: Template, measures: Mapping[str, float], parts: Mapping[str, float], holds: Holds | None
+    template: Template, measures: Mapping[str, float], parts: Mapping[str, float], holds: CapacityTarget | None
 ) -> np.ndarray:
     """Return the extents along X, Y and Z, the longest side of each part, and the cube root of the capacity."""
     try:
@@ -156,10 +156,11 @@ def _check(template: Template, measures: Mapping[str, float], names: list[str], 
         if not usual.low / MARGIN <= value <= usual.high * MARGIN:
             unit = usual.unit or "(a ratio)"
             raise UsageError(
-                f"{_impossible(template, stated)}: its {name.removesuffix('_m').replace('_', ' ')} would be {value:.3g} {unit},"
+                f"{_impossible_message(template, stated)}: its {name.removesuffix('_m').replace('_', ' ')} would be"
+                f" {value:.3g} {unit},"
                 f" such are {usual.low:g} to {usual.high:g}; check the numbers and the unit"
             )
 
 
-def _impossible(template: Template, stated: list[str]) -> str:
+def _impossible_message(template: Template, stated: list[str]) -> str:
     return f"no {template.category} can be given {'all of this' if len(stated) > 1 else 'this'} ({', '.join(stated)})"

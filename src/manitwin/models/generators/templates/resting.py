@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 from manitwin.models.generators.templates.template import Model, Vector
 
 
-def rested(model: Model) -> Model:
+def pitch_to_rest(model: Model) -> Model:
     """Return a model that lies along X, tipped about Y into its resting pose on z = 0.
 
     A spoon laid on its bowl tips until the end of its handle touches the table.
@@ -24,7 +24,7 @@ def rested(model: Model) -> Model:
         return x, y, z
 
     points = [replace(p, position_m=turned(p.position_m), direction=turned(p.direction)) for p in model.points]
-    return Model(model.assembly.turned(rotation), dict(model.slots), points, model.perforated).laid()
+    return Model(model.assembly.turned(rotation), dict(model.slots), points, model.perforated).rest_on_ground()
 
 
 def resting_pitch_rad(triangles_m: np.ndarray) -> float:

@@ -72,20 +72,20 @@ class StandardSize:
     lengths_m: Mapping[str, float] = field(default_factory=dict)
 
 
-def in_codes(plain: str) -> str:
-    """Return a text in the form of ``in_figures`` with each named size as one word: 'letter-size', 'm8x40', '2x4'."""
+def join_size_codes(plain: str) -> str:
+    """Return a text in the form of ``normalise_lengths`` with each named size as one word: 'letter-size', 'm8x40', '2x4'."""
     for spelt, code in _REWRITTEN:
         plain = re.sub(spelt, code, plain)
     return plain
 
 
 def is_size_code(word: str) -> bool:
-    """Return whether a word in the form of ``in_codes`` is a named size and nothing else."""
+    """Return whether a word in the form of ``join_size_codes`` is a named size and nothing else."""
     return word in _SHEETS_M or word in _CELLS_M
 
 
 def standard_size(category: str, words: Sequence[str]) -> StandardSize | None:
-    """Return the first named size that applies to a category, among words in the form of ``in_codes``; None if there is none.
+    """Return the first named size that applies to a category, among words in the form of ``join_size_codes``, or None.
 
     Raises UsageError for a toy brick with other studs than the template's.
     """

@@ -46,7 +46,7 @@ class Amount:
 
 
 def amounts_in(plain: str, prior: Prior) -> list[Amount]:
-    """Return the volumes and masses stated in a text in the form of ``in_figures``; ounces of a container are fluid ounces.
+    """Return the volumes and masses in a text in the form of ``normalise_lengths``; ounces of a container are fluid ounces.
 
     Raises UsageError for a range of amounts.
     """
@@ -83,5 +83,5 @@ def _size(unit: str, units: dict[str, float]) -> float | None:
 
 
 def without_amounts(plain: str) -> str:
-    """Return a text in the form of ``in_figures`` without volumes and masses."""
+    """Return a text in the form of ``normalise_lengths`` without volumes and masses."""
     return " ".join(_AMOUNT.sub(" ", plain).split())

@@ -19,7 +19,7 @@ _NUMBER = rf"(?<![\w.]){_DIGITS}"
 _AMOUNT = rf"({_NUMBER}) ?({_UNIT})\b\.?"
 _MEASURES = "height|width|length|diameter|depth"
 LENGTH = re.compile(rf"{_AMOUNT} ?(?:in (?={_MEASURES}))?(\w{{0,12}})")
-"""A length in the form of ``in_figures``: number, unit, and the following word, which may be a direction."""
+"""A length in the form of ``normalise_lengths``: number, unit, and the following word, which may be a direction."""
 _OF_A_PART = re.compile(
     rf"(?:^| )(with|having|and)( an?) {_AMOUNT}( long)?((?: \w+){{0,3}}?) (\w+)"
     r"(?=$| ?[,;.]| (?:and|with|having|of|in|made|for)\b)"
@@ -55,7 +55,7 @@ DIRECTIONS = {
     "diameter": "width", "across": "width", "long": "length", "length": "length", "deep": "depth", "thick": "height",
     "longest": "", "secondside": "second", "diagonal": "diagonal", "diagonally": "diagonal",
 }  # fmt: skip
-"""``second`` is the second longest side, as of a tray of 30 x 20 cm; ``secondside`` is its form in ``in_figures``."""
+"""``second`` is the second longest side, as of a tray of 30 x 20 cm; ``secondside`` is its form in ``normalise_lengths``."""
 _NUMERALS = {
     "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10,
     "eleven": 11, "twelve": 12,
@@ -65,39 +65,39 @@ _SPELT = re.compile(rf"\b({'|'.join(_NUMERALS)})(?= (?:{_UNIT.replace('|in|', '|
 _SIGNS = {"½": "1/2", "¼": "1/4", "¾": "3/4", "⅓": "1/3", "⅔": "2/3", "⅛": "1/8", "⅜": "3/8", "⅝": "5/8", "⅞": "7/8"}
 _OF_AMOUNTS = r"[mcd]?l|lit(?:re|er)s?|fl\b.*|oz|ounces?|pints?|pt|quarts?|qts?|gallons?|gals?|k?g|lbs?|pounds?"
 _FRACTION = re.compile(rf"(?<![\w./])(?:(\d+) )?(\d{{1,3}})/(\d{{1,3}})(?= ?-?(?:{_UNIT}|{_OF_AMOUNTS})\b)")
-_SO_MANY_IN_ONE = re.compile(r"\b(\d+) in (\d+)\b(?! ?/)")
+_COUNT_IN_ONE = re.compile(r"\b(\d+) in (\d+)\b(?! ?/)")
 """'a 3 in 1 pen' is not three inches long."""
 _FEET_AND_INCHES = re.compile(rf"({_NUMBER}) ?(?:foot|feet|ft)\.? (?:and )?({_NUMBER}) ?(?:inch(?:es)?|in)\b")
 
 
 def lengths_in(text: str) -> dict[str, float]:
     """Return the lengths (m) of the whole object stated in a text, by direction; '' is the longest side."""
-    return lengths_of_whole(in_figures(text))
+    return lengths_of_whole(normalise_lengths(text))
 
 
 def lengths_of_whole(plain: str) -> dict[str, float]:
-    """Return the lengths (m) of the whole object in a text in the form of ``in_figures``, by direction."""
+    """Return the lengths (m) of the whole object in a text in the form of ``normalise_lengths``, by direction."""
     found = LENGTH.findall(without_lengths_of_parts(plain))
     return {DIRECTIONS.get(direction, ""): float(number) * _metres(unit) for number, unit, direction in found}
 
 
 def lengths_of_parts(plain: str) -> dict[str, float]:
-    """Return the lengths (m) of parts in a text in the form of ``in_figures``, by the part's word."""
+    """Return the lengths (m) of parts in a text in the form of ``normalise_lengths``, by the part's word."""
     return {m[7]: float(m[3]) * _metres(m[4]) for m in _OF_A_PART.finditer(plain) if m[7] not in DIRECTIONS}
 
 
 def without_lengths_of_parts(plain: str) -> str:
-    """Return a text in the form of ``in_figures`` without the lengths of parts: 'with a blade'."""
+    """Return a text in the form of ``normalise_lengths`` without the lengths of parts: 'with a blade'."""
     return _OF_A_PART.sub(lambda m: m[0] if m[7] in DIRECTIONS else f" {m[1]}{m[2]}{m[6]} {m[7]}", plain)
 
 
-def several_lengths(plain: str) -> bool:
-    """Return whether a text in the form of ``in_figures`` states several lengths of one direction, or a range."""
+def has_several_lengths(plain: str) -> bool:
+    """Return whether a text in the form of ``normalise_lengths`` states several lengths of one direction, or a range."""
     plain = without_lengths_of_parts(plain)
     return len(LENGTH.findall(plain)) > len(lengths_of_whole(plain)) or _RANGE.search(plain) is not None
 
 
-def in_figures(text: str) -> str:
+def normalise_lengths(text: str) -> str:
     """Return a text in lower case with each length as number, unit and direction: '14 inches long'.
 
     Decimal commas become points, inch and foot marks become words, number words and fractions become figures. Feet with inches,
@@ -110,7 +110,7 @@ def in_figures(text: str) -> str:
     plain = re.sub(r"(?<=\d) ?(?:\"|″|'')", " inches ", plain)
     plain = re.sub(r"(?<=\d) ?(?:'|′)(?![a-z])", " ft ", plain)  # but not "the 70's"
     plain = re.sub(r"(?<=\d)-(?=\d+/\d)", " ", plain)
-    plain = _FRACTION.sub(_in_decimals, plain)
+    plain = _FRACTION.sub(_fraction_to_decimal, plain)
     plain = re.sub(r"[ø⌀]|\bdiam?\b\.?", " diameter ", plain)
     plain = re.sub(r" [-–—] (?!\.?\d)|(?<!\d) [-–—] ", " , ", plain)
     plain = _LETTERS_FIRST.sub(lambda m: _with_letters(m.groups()[3:], m.groups()[:3]) or m[0], plain)
@@ -121,9 +121,9 @@ def in_figures(text: str) -> str:
     plain = _TIMES.sub(lambda m: f" {m[1] or ''} x ", " ".join(plain.replace(",", " , ").replace("-", " ").split()))
     plain = " ".join(plain.split())
     plain = _SPELT.sub(lambda m: str(_NUMERALS[m[1]]), plain)
-    plain = _SO_MANY_IN_ONE.sub(r"\1in\2", plain)
+    plain = _COUNT_IN_ONE.sub(r"\1in\2", plain)
     plain = _FEET_AND_INCHES.sub(lambda m: f"{12 * float(m[1]) + float(m[2]):g} inches", plain)
-    plain = _IN_TWO_UNITS.sub(_once, plain)
+    plain = _IN_TWO_UNITS.sub(_merge_equal_lengths, plain)
     plain = _BY.sub(_by_direction, plain)
     plain = _PART_OF_LENGTH.sub(lambda m: f"{m[1]} a {m[3]} {m[4]} {m[2]}", plain)
     return _NAMED_LENGTH.sub(lambda m: f"{m[2]} {m[1]}", plain)
@@ -153,7 +153,7 @@ def _by_letter(found: re.Match[str]) -> str:
     return " ".join(f"{side[1]} {unit or units[-1]} {ways[letter]}" for side, unit, letter in said if letter)
 
 
-def _once(found: re.Match[str]) -> str:
+def _merge_equal_lengths(found: re.Match[str]) -> str:
     """Return the first of two lengths that are equal up to rounding in different units; both otherwise."""
     first, second = (float(found[at]) * _metres(found[at + 1]) for at in (1, 3))
     same = found[2] != found[4] and abs(first - second) <= ROUNDED * max(first, second)
@@ -173,7 +173,7 @@ def _by_direction(found: re.Match[str]) -> str:
     return " ".join(f"{n} {u} {way}" for (n, u), way in zip(amounts, ("longest", "secondside"), strict=True))
 
 
-def _in_decimals(found: re.Match[str]) -> str:
+def _fraction_to_decimal(found: re.Match[str]) -> str:
     whole, above, below = (int(part or 0) for part in found.groups())
     return found[0] if below == 0 else f"{float(whole + Fraction(above, below)):g}"
 

@@ -20,7 +20,7 @@ Group = Literal["kitchen", "tools", "electronics", "personal", "office", "househ
 """The paper's six groups of categories."""
 Vector = tuple[float, float, float]
 PointKind = Literal["opening", "face", "tip", "edge", "hole", "axis", "button", "surface"]
-IN_THE_OPEN: frozenset[PointKind] = frozenset({"opening", "hole", "axis"})
+OFF_SURFACE_KINDS: frozenset[PointKind] = frozenset({"opening", "hole", "axis"})
 """Kinds of points that need not lie on the surface."""
 
 
@@ -33,7 +33,7 @@ class Measure:
     high: float
     unit: Literal["m", ""]
 
-    def drawn(self, rng: np.random.Generator) -> float:
+    def sample(self, rng: np.random.Generator) -> float:
         """Sample a value from the triangular distribution with its mode at the typical value."""
         return float(rng.triangular(self.low, self.typical, self.high)) if self.high > self.low else self.typical
 
@@ -88,7 +88,7 @@ class Model:
         self.points.append(KnownPoint(label, kind, part, position_m, direction))
         return self
 
-    def laid(self) -> Model:
+    def rest_on_ground(self) -> Model:
         """Return the model moved vertically to rest on z = 0."""
         by_m = -self.assembly.lowest_m()
         points = [
@@ -143,11 +143,11 @@ class Template:
     told_in_full: bool = False
     bare: tuple[str, ...] = ()
 
-    def drawn(self, rng: np.random.Generator) -> dict[str, float]:
+    def sample_measures(self, rng: np.random.Generator) -> dict[str, float]:
         """Return sampled values of all measures by name."""
-        return {name: measure.drawn(rng) for name, measure in self.measures.items()}
+        return {name: measure.sample(rng) for name, measure in self.measures.items()}
 
-    def typical(self) -> dict[str, float]:
+    def typical_measures(self) -> dict[str, float]:
         """Return the typical values of all measures by name."""
         return {name: measure.typical for name, measure in self.measures.items()}
 

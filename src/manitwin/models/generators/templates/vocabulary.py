@@ -117,7 +117,7 @@ CONTENTS = frozenset(
 """Materials and colours that are contents after 'of': a bottle of soap."""
 
 
-def speaks_of_others(words: Sequence[str], at: int) -> bool:
+def is_other_object_start(words: Sequence[str], at: int) -> bool:
     """Return whether the text after a word describes other objects; 'full' only does before 'of' or 'with' (not in 'half full
     glass').
     """

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from sapien import physx
 
-from manitwin.physics.sapien.contacts import Touches
+from manitwin.physics.sapien.contacts import TargetContacts
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
@@ -64,12 +64,12 @@ class HandControl(Protocol):
         """Process the contacts of the last step."""
         ...
 
-    def touches(self, touches: Touches) -> Touches:
+    def touches(self, touches: TargetContacts) -> TargetContacts:
         """Return the forces on the target, given those from its contacts."""
         ...
 
 
-def control_of(world: RobotWorld, settings: TrialSettings) -> HandControl:
+def create_hand_control(world: RobotWorld, settings: TrialSettings) -> HandControl:
     """Return the controller of the world's current robot."""
     from manitwin.physics.sapien.controls.cup import CupControl
     from manitwin.physics.sapien.controls.fingers import FingersControl

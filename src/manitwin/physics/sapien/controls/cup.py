@@ -17,7 +17,7 @@ from sapien import physx
 
 from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.physics.sapien.contacts import Touches
+from manitwin.physics.sapien.contacts import TargetContacts
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import GRAVITY_M_S2, TrialSettings
@@ -70,7 +70,7 @@ class CupControl:
         """Switch the vacuum on for a target above one half, otherwise off."""
         on = float(told[0]) > VACUUM_ON
         if self._on and not on:
-            self._let_go()
+            self._detach()
         self._on = on
 
     def shaping(self, grasp_joints_rad: np.ndarray | None, opening_m: float | None = None) -> Iterator[np.ndarray]:
@@ -95,13 +95,15 @@ class CupControl:
             self._bear(self._sealed, contacts)
         elif self._on:
             for number, placed in enumerate(self._world.placed):
-                touched = self._world.contacts.push(contacts, placed.name, frozenset({self._lip_name})) is not None
+                touched = (
+                    self._world.contacts.resultant_force(contacts, placed.name, frozenset({self._lip_name})) is not None
+                )
                 if touched and self._try_to_seal(number):
                     break
 
-    def touches(self, touches: Touches) -> Touches:
+    def touches(self, touches: TargetContacts) -> TargetContacts:
         """Return the pressing force of the lip: the vacuum force less the pull on it; 0 if it is not sealed."""
-        return Touches((self._pressure_n, self._pressure_n), touches.on_support)
+        return TargetContacts((self._pressure_n, self._pressure_n), touches.on_support)
 
     def _try_to_seal(self, number: int) -> bool:
         lip_to_world = self._world.robot.gripper_pose() @ transform(translation=np.array([0, 0, self.state[0]]))
@@ -133,7 +135,7 @@ class CupControl:
         acceleration = (velocity_m_s - held.velocity_m_s) / self._settings.timestep_s
         held.velocity_m_s = velocity_m_s
         names = frozenset(name for name in self._world.contacts.names if name != placed.name)
-        push = self._world.contacts.push(contacts, placed.name, names)
+        push = self._world.contacts.resultant_force(contacts, placed.name, names)
         borne_n = np.zeros(3) if push is None else push.force_n
         force_n = placed.body.mass_kg * (np.array([0, 0, -GRAVITY_M_S2]) - acceleration) + borne_n
         center_m, lip_m = transform_points(object_to_world, np.array([placed.body.center_of_mass_m, held.center_m]))
@@ -148,9 +150,9 @@ class CupControl:
         )
         self._pressure_n = max(0.0, self._settings.force_n - float(force_n @ inward))
         if share > 1:
-            self._let_go()
+            self._detach()
 
-    def _let_go(self) -> None:
+    def _detach(self) -> None:
         if self._sealed is not None:
             self._sealed.drive.entity.remove_component(self._sealed.drive)
             self._world.robot.block_plunger(False)

@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 from sapien import physx
 
-from manitwin.physics.sapien.contacts import Touches
+from manitwin.physics.sapien.contacts import TargetContacts
 from manitwin.physics.sapien.fingers import FingerClosing
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
@@ -65,7 +65,7 @@ class FingersControl:
                 strength=self._settings.force_n / self._gripper.force_n,
                 frame_s=self._settings.frame_s,
             )
-        return self._closing.move_on(self._world.robot.hand_positions())
+        return self._closing.advance_targets(self._world.robot.hand_positions())
 
     def closing_empty(self) -> Iterator[np.ndarray]:
         """Do nothing: only jaws are used as a tool."""
@@ -80,7 +80,7 @@ class FingersControl:
     def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
         """Do nothing: fingers measure their own contact torque."""
 
-    def touches(self, touches: Touches) -> Touches:
+    def touches(self, touches: TargetContacts) -> TargetContacts:
         """Return the forces from the contacts."""
         return touches
 

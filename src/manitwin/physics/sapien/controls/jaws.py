@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from sapien import physx
 
-from manitwin.physics.sapien.contacts import Touches
+from manitwin.physics.sapien.contacts import TargetContacts
 from manitwin.physics.sapien.robot import SapienRobot
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.shared_target import SharedTarget
@@ -59,7 +59,7 @@ class JawsControl:
 
     def squeeze(self) -> np.ndarray:
         """Return the target advanced by one frame."""
-        return np.array([2 * self._shared.move_on(self._robot.opening_m() / 2)])
+        return np.array([2 * self._shared.advance_target(self._robot.opening_m() / 2)])
 
     def closing_empty(self) -> Iterator[np.ndarray]:
         """Yield targets that close the jaws at the closing speed, without a pressing force."""
@@ -79,7 +79,7 @@ class JawsControl:
     def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
         """Do nothing: jaws measure their own force."""
 
-    def touches(self, touches: Touches) -> Touches:
+    def touches(self, touches: TargetContacts) -> TargetContacts:
         """Return the forces from the contacts."""
         return touches
 

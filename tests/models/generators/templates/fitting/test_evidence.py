@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from manitwin.models.generators.templates.fitting.evidence import (
-    FINE,
+    OVERSAMPLING,
     REACH,
     SIDE_PX,
+    fill_small_holes,
     signed_distance,
-    without_small_holes,
 )
 
-SIDE = FINE * SIDE_PX
+SIDE = OVERSAMPLING * SIDE_PX
 MASKS = {
     "slim": ((30, 110, 12, 4), 0),
     "upright": ((110, 30, 6, 150), 0),
@@ -36,7 +36,7 @@ def test_a_distance_is_that_of_the_whole_picture(name: str) -> None:
         turn = cv2.getRotationMatrix2D((SIDE / 2, SIDE / 2), degrees, 1.0)
         mask = cv2.warpAffine(mask, turn, (SIDE, SIDE), flags=cv2.INTER_NEAREST)
     away = cv2.distanceTransform(mask, cv2.DIST_L2, 3) - cv2.distanceTransform(1 - mask, cv2.DIST_L2, 3)
-    whole = np.clip(away[1 :: 2 * FINE, 1 :: 2 * FINE] / (REACH * SIDE), -1, 1)
+    whole = np.clip(away[1 :: 2 * OVERSAMPLING, 1 :: 2 * OVERSAMPLING] / (REACH * SIDE), -1, 1)
     assert np.array_equal(signed_distance(mask), whole)
 
 
@@ -46,5 +46,5 @@ def test_small_holes_are_filled_and_a_loop_is_not() -> None:
     whole = mask.copy()
     mask[60:66, 60:66] = mask[100:104, 90:98] = False
     mask[120:160, 120:160] = whole[120:160, 120:160] = False
-    assert np.array_equal(without_small_holes(mask), whole)
-    assert without_small_holes(whole) is whole
+    assert np.array_equal(fill_small_holes(mask), whole)
+    assert fill_small_holes(whole) is whole

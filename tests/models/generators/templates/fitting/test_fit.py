@@ -18,23 +18,23 @@ from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.generators.lift import LiftGenerator
 from manitwin.models.generators.lift.lifting import hint_from_name, lift
-from manitwin.models.generators.lift.made_photo import fitted_or_lifted, from_photo
-from manitwin.models.generators.lift.nameless import OF_LIKELY_NAMES
-from manitwin.models.generators.lift.several import from_views
+from manitwin.models.generators.lift.multi_view_generation import generate_from_views
+from manitwin.models.generators.lift.photo_generation import fit_or_lift, generate_from_photo
+from manitwin.models.generators.lift.unnamed_shape import TEMPLATE_SOURCE
 from manitwin.models.generators.protocol import Generated, GenerationRequest, PhotoView
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.fitting.drawing import edges_between, seen_faces, silhouette, to_pixels
+from manitwin.models.generators.templates.fitting.drawing import edges_between, silhouette, to_pixels, visible_faces
 from manitwin.models.generators.templates.fitting.fit import (
     LEAST_CONFIDENCE,
     MOST_OUTLINE,
+    alternative_categories,
     confidence_of,
     fit,
-    kinds_of,
     template_for,
 )
-from manitwin.models.generators.templates.fitting.generated import texture_of
-from manitwin.models.generators.templates.fitting.several import fit_several
-from manitwin.models.generators.templates.fitting.view import View, boxed, normalised
+from manitwin.models.generators.templates.fitting.generated import texture_fit
+from manitwin.models.generators.templates.fitting.joint_fit import fit_several
+from manitwin.models.generators.templates.fitting.view import View, frame_placement, normalised
 
 SIDE_PX = 480
 LETTERS = (250, 40, 40)
@@ -43,11 +43,11 @@ LETTERS = (250, 40, 40)
 def photo_of(category: str, view: View, measures: dict[str, float], *, letters: bool = False) -> np.ndarray:
     """Draw a template, lit from the upper left, on transparent magenta ``(H, W, 4)``; letters on its front are red bars."""
     template = load_templates()[category]
-    mesh = template.build(**template.typical() | measures).assembly.mesh()
+    mesh = template.build(**template.typical_measures() | measures).assembly.mesh()
     points, _, _ = normalised(mesh.vertices)
-    scale, x, y = boxed(view.project(points)[0])
+    scale, x, y = frame_placement(view.project(points)[0])
     flat, distance = View(**vars(view) | {"scale": scale, "x": x, "y": y}).project(points)
-    face = seen_faces(to_pixels(flat, SIDE_PX, 0.7), distance, mesh.faces, SIDE_PX)
+    face = visible_faces(to_pixels(flat, SIDE_PX, 0.7), distance, mesh.faces, SIDE_PX)
     solid = trimesh.Trimesh(points, mesh.faces, process=False)
     normals = solid.face_normals @ view.object_to_camera.T
     light = 0.45 + 0.5 * np.clip(normals @ np.array([-0.4, 0.6, 0.69]), 0, 1)
@@ -86,12 +86,12 @@ def test_small_holes_need_not_be_where_the_template_makes_them(
 
 
 def test_silhouette_is_that_of_every_layer_together() -> None:
-    mesh = load_templates()["mug"].build(**load_templates()["mug"].typical()).assembly.mesh()
+    mesh = load_templates()["mug"].build(**load_templates()["mug"].typical_measures()).assembly.mesh()
     points, _, _ = normalised(mesh.vertices)
     flat, distance = View(0.7, 0.5, 0.1, 0.2, scale=0.5).project(points)
     pixels = to_pixels(flat, 200, 0.8)
     drawn = silhouette(pixels, mesh.faces, edges_between(mesh.faces), 200)
-    painted = seen_faces(pixels, distance, mesh.faces, 200) >= 0  # fills each pixel that a face touches
+    painted = visible_faces(pixels, distance, mesh.faces, 200) >= 0  # fills each pixel that a face touches
     assert 0 <= painted.sum() - drawn.sum() < 0.6 * cv2.arcLength(_outer(painted), True)
     assert not (drawn > painted).any()
 
@@ -139,7 +139,7 @@ def test_several_photos_share_their_measures_and_have_views_of_their_own() -> No
     sides = np.sort(np.ptp(fits[0].made.mesh.vertices, axis=0))
     assert sides[:2] / sides[2] == pytest.approx([0.55, 0.85], rel=0.04)
     # a second photo shows a side, and the lid, that the first does not
-    both, alone = texture_of(fits, photos), texture_of(fits[:1], photos[:1])
+    both, alone = texture_fit(fits, photos), texture_fit(fits[:1], photos[:1])
     assert both.unseen_share < alone.unseen_share - 0.1
 
 
@@ -148,9 +148,9 @@ def test_turns_that_the_photos_contradict_are_refused_by_the_photo() -> None:
     photos = [photo_of("mug", View(-0.7 - turn, 0.3, 0.0, 0.2), {}) for turn in (0.0, np.pi / 2)]
     named = [PhotoView(f"{turn}.png", rgba, turn) for turn, rgba in zip((0.0, 200.0), photos, strict=True)]
     with pytest.raises(Rejected, match=r"200\.0\.png shows the mug from \d+ degrees, not 200"):
-        from_views(named, "mug")
+        generate_from_views(named, "mug")
     right = [PhotoView(view.name, view.rgba, turn) for view, turn in zip(named, (0.0, 90.0), strict=True)]
-    made = from_views(right, "mug")
+    made = generate_from_views(right, "mug")
     assert made.notes["primitive"] == "template:mug" and made.known is not None
     assert [view["turn_deg"] for view in made.notes["views"]] == pytest.approx([0, 90], abs=8)
 
@@ -182,26 +182,30 @@ def test_names_of_templates_and_of_priors_find_a_template() -> None:
         template = template_for(name)
         assert template is not None and template.category == category
     assert template_for(None) is None and template_for("unicorn") is None
-    assert "drink can" in kinds_of("can") and "watering can" not in kinds_of("can")
-    assert not {"food container", "matchbox"} & set(kinds_of("box")), "a box has no clips, and no drawer"
-    assert {"mug", "cup and saucer"} <= set(kinds_of("cup")) and "cup" not in kinds_of("mug")
-    assert "mallet" in kinds_of("hammer"), "the priors have it beside the hammer"
-    assert "mallet" in kinds_of("hammer", "small hammer") and "mallet" not in kinds_of("hammer", "my claw hammer")
-    assert "cap" in kinds_of("hat", "red hats") and "cap" not in kinds_of("hat", "sun hat")
-    assert "tissue box" in kinds_of("box", "small brown box")
+    assert "drink can" in alternative_categories("can") and "watering can" not in alternative_categories("can")
+    assert not {"food container", "matchbox"} & set(alternative_categories("box")), "a box has no clips, and no drawer"
+    assert {"mug", "cup and saucer"} <= set(alternative_categories("cup")) and "cup" not in alternative_categories(
+        "mug"
+    )
+    assert "mallet" in alternative_categories("hammer"), "the priors have it beside the hammer"
+    assert "mallet" in alternative_categories("hammer", "small hammer") and "mallet" not in alternative_categories(
+        "hammer", "my claw hammer"
+    )
+    assert "cap" in alternative_categories("hat", "red hats") and "cap" not in alternative_categories("hat", "sun hat")
+    assert "tissue box" in alternative_categories("box", "small brown box")
     for told in ("box of pencils", "spark_plug_box", "a light bulb box"):
-        assert kinds_of("box", told) == [], "it keeps no tissues"
-    assert {"ketchup bottle", "detergent bottle", "spray bottle"} <= set(kinds_of("bottle"))
+        assert alternative_categories("box", told) == [], "it keeps no tissues"
+    assert {"ketchup bottle", "detergent bottle", "spray bottle"} <= set(alternative_categories("bottle"))
     told_in_full = {category for category, template in load_templates().items() if template.told_in_full}
     assert "perfume bottle" in told_in_full, "a brown bottle was one"
-    assert not told_in_full & {kind for category in load_templates() for kind in kinds_of(category)}
+    assert not told_in_full & {kind for category in load_templates() for kind in alternative_categories(category)}
 
 
 def test_texture_has_neither_background_nor_mirrored_letters() -> None:
     rgba = photo_of("can", View(0.0, np.radians(12), 0.0, 0.15), {"width": 0.7}, letters=True)
     fitted = fit("can", rgba)
     assert fitted is not None
-    surface = texture_of([fitted], [rgba])
+    surface = texture_fit([fitted], [rgba])
     height, width = surface.texture.shape[:2]
     middle = surface.uv.mean(axis=1)
     at = np.column_stack([(1 - middle[:, 1]) * height, middle[:, 0] * width]).astype(int)
@@ -277,8 +281,8 @@ def test_outline_of_a_box_is_no_round_thing_where_the_name_says_that_it_is_not_r
     residual = replace(fitted.residual, outline=3 * MOST_OUTLINE)
     doubtful = replace(fitted, category="basket", residual=residual, confidence=confidence_of(residual))
     with pytest.raises(Rejected, match="a basket is not round"):
-        fitted_or_lifted(doubtful, rgba, "basket")
-    assert fitted_or_lifted(None, rgba, "basket").notes["primitive"] == "revolution"
+        fit_or_lift(doubtful, rgba, "basket")
+    assert fit_or_lift(None, rgba, "basket").notes["primitive"] == "revolution"
 
 
 @pytest.mark.parametrize(
@@ -308,30 +312,30 @@ def nameless_mug() -> Iterator[np.ndarray]:
 
 def test_a_nameless_thing_has_the_shape_of_a_likely_name_that_explains_the_photo(nameless_mug: np.ndarray) -> None:
     likely = (("wrench", 0.5), ("mug", 0.2), ("bowl", 0.05))
-    job = from_photo(nameless_mug, None, likely=likely)
-    assert job.notes["primitive"] == "shape of template:mug" and job.notes["source"] == OF_LIKELY_NAMES
+    job = generate_from_photo(nameless_mug, None, likely=likely)
+    assert job.notes["primitive"] == "shape of template:mug" and job.notes["source"] == TEMPLATE_SOURCE
     assert job.known is None and "category" not in job.notes, "it is not called so"
     assert job.notes["rests"] == "standing"
 
 
 def test_a_nameless_thing_that_no_likely_name_explains_is_lifted(nameless_mug: np.ndarray) -> None:
-    lifted = from_photo(nameless_mug, None)
+    lifted = generate_from_photo(nameless_mug, None)
     assert not lifted.notes["primitive"].startswith("shape of"), "without names it is lifted"
     unlike, unlikely = (("wrench", 0.9), ("plunger", 0.1)), (("mug", 0.09),)
-    assert from_photo(nameless_mug, None, likely=unlike).glb == lifted.glb
-    assert from_photo(nameless_mug, None, likely=unlikely).glb == lifted.glb
+    assert generate_from_photo(nameless_mug, None, likely=unlike).glb == lifted.glb
+    assert generate_from_photo(nameless_mug, None, likely=unlikely).glb == lifted.glb
 
 
 @pytest.mark.slow
 def test_a_nameless_ellipse_is_what_explains_it_better_than_any_ellipse_is() -> None:
     pan = photo_of("frying pan", View(np.radians(-90.0), np.radians(35.0), 0.0, 0.1), {})
-    seen = from_photo(pan, None, likely=(("frying pan", 0.9),))
+    seen = generate_from_photo(pan, None, likely=(("frying pan", 0.9),))
     assert seen.notes["primitive"] == "shape of template:frying pan"
     plate = photo_of("plate", View(0.4, np.radians(55.0), 0.0, 0.2), {})
     with pytest.raises(Rejected, match="the outline is an ellipse"):
-        from_photo(plate, None, likely=(("frying pan", 0.4),))
+        generate_from_photo(plate, None, likely=(("frying pan", 0.4),))
     assert (
-        from_photo(plate, None, likely=(("frying pan", 0.4), ("plate", 0.3))).notes["primitive"]
+        generate_from_photo(plate, None, likely=(("frying pan", 0.4), ("plate", 0.3))).notes["primitive"]
         == "shape of template:plate"
     )
 
@@ -363,6 +367,6 @@ def test_kind_that_comes_nearest_is_searched_by_itself_where_it_is_not_believed(
     bent_x = x + 0.006 * SIDE_PX * np.sin(6.0 * y / SIDE_PX + 1.5)
     bent_y = y + 0.006 * SIDE_PX * np.sin(5.0 * x / SIDE_PX + 3.0)
     photo = cv2.remap(straight, bent_x.astype(np.float32), bent_y.astype(np.float32), cv2.INTER_NEAREST)
-    found = fit("cup", photo, or_of=kinds_of("cup"))
+    found = fit("cup", photo, or_of=alternative_categories("cup"))
     assert found is not None and found.category == "cup and saucer" and found.confidence >= LEAST_CONFIDENCE
     assert found.residual.outline < 0.25 * MOST_OUTLINE

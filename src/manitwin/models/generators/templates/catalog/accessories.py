@@ -65,10 +65,12 @@ def glasses(*, width_m: float, lens: float, height: float, temple_m: float, fram
         )
     model.point("lenses", "face", "lenses", (at, front - 0.0009, middle), (0.0, -1.0, 0.0))
     model.point("bridge", "surface", "bridge", (0.0, front, over + 0.1 * high + 0.75 * frame_m), (0.0, 0.0, 1.0))
-    return model.point("temple", "surface", "temples", (out + 0.002, 0.0, side_z - 0.001), (1.0, 0.0, 0.0)).laid()
+    return model.point(
+        "temple", "surface", "temples", (out + 0.002, 0.0, side_z - 0.001), (1.0, 0.0, 0.0)
+    ).rest_on_ground()
 
 
-def _strapped(model: Model, loop_m: float, strap_m: float, thick_m: float, least_m: float) -> tuple[float, float]:
+def _add_strap(model: Model, loop_m: float, strap_m: float, thick_m: float, least_m: float) -> tuple[float, float]:
     """Add a closed strap about Z with its buckle at +Y.
 
     Returns the Y coordinate of its front, and the tilt (degrees) at which a case on it rests. ``least_m`` is half the height of
@@ -96,7 +98,7 @@ def watch(*, case_m: float, thick: float, strap: float, loop_m: float) -> Model:
     """Build a watch that rests on the edges of its closed strap and its case, with the dial towards -Y."""
     r, deep = 0.5 * case_m, thick * case_m
     model = Model()
-    front, tilt = _strapped(model, loop_m, strap * case_m, 0.0026, r)
+    front, tilt = _add_strap(model, loop_m, strap * case_m, 0.0026, r)
     case = lathe(
         rounded(
             [
@@ -141,7 +143,7 @@ def watch(*, case_m: float, thick: float, strap: float, loop_m: float) -> Model:
     model.point("dial", "face", "dial", (0.0, y, z), (0.0, *out))
     y, z = _tilted((front - 0.45 * deep, 0.0), tilt)
     model.point("crown", "button", "crown", (r + 0.0032, y, z), (1.0, 0.0, 0.0))
-    return model.point("strap", "hole", "strap", (0.0, 0.0, 0.0), (0.0, *_tilted((0.0, 1.0), tilt))).laid()
+    return model.point("strap", "hole", "strap", (0.0, 0.0, 0.0), (0.0, *_tilted((0.0, 1.0), tilt))).rest_on_ground()
 
 
 @template("smart watch")
@@ -149,7 +151,7 @@ def smart_watch(*, case_m: float, width: float, thick: float, strap: float, loop
     """Build a watch with a rounded rectangular screen that rests on its closed strap, with the screen towards -Y."""
     across, deep = width * case_m, thick * case_m
     model = Model()
-    front, tilt = _strapped(model, loop_m, strap * across, 0.0028, 0.5 * across)
+    front, tilt = _add_strap(model, loop_m, strap * across, 0.0028, 0.5 * across)
     # The strap follows the longer side of the case, which is along X here.
     face = front - deep + 0.002
 
@@ -168,7 +170,7 @@ def smart_watch(*, case_m: float, width: float, thick: float, strap: float, loop
     model.point("screen", "face", "screen", (0.0, y, z), (0.0, *_tilted((-1.0, 0.0), tilt)))
     y, z = _tilted((face + 0.5 * deep, 0.5 * across + 0.0024), tilt)
     model.point("button", "button", "button", (0.2 * case_m, y, z), (0.0, *_tilted((0.0, 1.0), tilt)))
-    return model.point("strap", "hole", "strap", (0.0, 0.0, 0.0), (0.0, *_tilted((0.0, 1.0), tilt))).laid()
+    return model.point("strap", "hole", "strap", (0.0, 0.0, 0.0), (0.0, *_tilted((0.0, 1.0), tilt))).rest_on_ground()
 
 
 @template("wallet")

@@ -18,7 +18,7 @@ from manitwin.geometry.solids.shapes import (
     union,
 )
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.organic import ribbed, turned
+from manitwin.models.generators.templates.catalog.organic import scale_radially, smooth_revolution
 from manitwin.models.generators.templates.catalog.rings import ring_radii
 from manitwin.models.generators.templates.template import Model, template
 
@@ -26,7 +26,7 @@ from manitwin.models.generators.templates.template import Model, template
 def _both_faces(model: Model, height_m: float, off_m: float = 0.0) -> Model:
     """Add points on the upper and the lower side, ``off_m`` beside the centre, and place the model on the ground."""
     model.point("top", "surface", "body", (off_m, 0.0, height_m), (0.0, 0.0, 1.0))
-    return model.point("base", "surface", "body", (off_m, 0.0, 0.0), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "surface", "body", (off_m, 0.0, 0.0), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("bagel")
@@ -62,12 +62,12 @@ def bun(*, width_m: float, tall: float, flat: float) -> Model:
         (0.4, 0.97),
         (0, 1.0),
     ]
-    body = turned(profile, width_m, h, sides=64)
+    body = smooth_revolution(profile, width_m, h, sides=64)
     model = Model().add("body", body)
     model.region("crust", "body", lambda c: c[:, 2] > 0.8 * flat * h, "crust")
     model.region("base", "body", lambda c: c[:, 2] < 0.02 * h)
     model.point("top", "surface", "crust", (0.0, 0.0, h), (0.0, 0.0, 1.0))
-    return model.point("base", "face", "base", (0.3 * r, 0.0, 0.0), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "face", "base", (0.3 * r, 0.0, 0.0), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("croissant")
@@ -83,7 +83,7 @@ def croissant(*, length_m: float, width: float, bend: float) -> Model:
     model.region("tips", "body", lambda c: np.abs(c[:, 0]) > 0.42 * length_m)
     top = float(np.array(body.bounding_box())[5])
     model.point("top", "surface", "body", (0.0, 0.0, top), (0.0, 0.0, 1.0))
-    return model.point("base", "surface", "body", (0.0, 0.0, -top), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "surface", "body", (0.0, 0.0, -top), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("muffin")
@@ -95,11 +95,11 @@ def muffin(*, width_m: float, tall: float, foot: float, dome: float) -> Model:
     r, h = 0.5 * width_m, tall * width_m
     low = (1 - dome) * h
     cup = lathe([(foot * r, 0.0), (0.86 * r, low)], sides=chords(96))
-    paper = ribbed(cup, lambda angle: 1 + 0.025 * np.cos(24 * angle))
+    paper = scale_radially(cup, lambda angle: 1 + 0.025 * np.cos(24 * angle))
     crown = [(0, low - 0.04 * h), (0.8 * r, low - 0.04 * h), (0.97 * r, low), (r, low + 0.14 * dome * h)]
     crown += [(0.93 * r, low + 0.46 * dome * h), (0.66 * r, low + 0.83 * dome * h), (0.3 * r, 0.99 * h), (0, h)]
     top = lathe(arc([(x, 0, z) for x, z in crown], samples=40)[:, [0, 2]])
-    model = Model().add("body", ribbed(top, lambda a: 1 + 0.012 * np.sin(5 * a) + 0.01 * np.sin(3 * a + 1)))
+    model = Model().add("body", scale_radially(top, lambda a: 1 + 0.012 * np.sin(5 * a) + 0.01 * np.sin(3 * a + 1)))
     model.add("cup", paper, "cup")
     chips = []
     for number in range(12):
@@ -113,7 +113,7 @@ def muffin(*, width_m: float, tall: float, foot: float, dome: float) -> Model:
         chips.append(chip.translate((off * float(np.cos(a)), off * float(np.sin(a)), z - 0.0015)))
     model.add("chips", union(chips), "chips")
     model.point("top", "surface", "body", (0.0, 0.0, h), (0.0, 0.0, 1.0))
-    return model.point("base", "face", "cup", (0.3 * foot * r, 0.0, 0.0), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "face", "cup", (0.3 * foot * r, 0.0, 0.0), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("bread slice")
@@ -137,7 +137,7 @@ def bread_slice(*, width_m: float, tall: float, thick_m: float, dome: float) -> 
     )
     model.point("front", "face", "body", (0.0, 0.0, thick_m), (0.0, 0.0, 1.0))
     model.point("edge", "surface", "crust", (0.0, -0.5 * d, 0.5 * thick_m), (0.0, -1.0, 0.0))
-    return model.point("back", "face", "body", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)).laid()
+    return model.point("back", "face", "body", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("hamburger")
@@ -148,7 +148,7 @@ def hamburger(*, width_m: float, crown: float, patty: float, heel: float) -> Mod
         "heel", lathe(rounded([(0, 0), (0.9 * r, 0), (0.96 * r, 0.5 * low), (0.94 * r, low), (0, low)], 0.3 * low))
     )
     at = low
-    rough = ribbed(
+    rough = scale_radially(
         lathe(
             rounded(
                 [(0, at - 0.001), (0.97 * r, at - 0.001), (r, at + 0.5 * meat), (0.97 * r, at + meat), (0, at + meat)],
@@ -164,7 +164,7 @@ def hamburger(*, width_m: float, crown: float, patty: float, heel: float) -> Mod
     model.add("cheese", slab.translate((0, 0, at - 0.0006)), "cheese")
     at += 0.0022
     frill = cylinder(1.03 * r, 0.004, sides=chords(96)).translate((0, 0, at - 0.0006))
-    model.add("salad", ribbed(frill, lambda a: 1 + 0.04 * np.sin(11 * a) + 0.02 * np.sin(17 * a)), "salad")
+    model.add("salad", scale_radially(frill, lambda a: 1 + 0.04 * np.sin(11 * a) + 0.02 * np.sin(17 * a)), "salad")
     at += 0.0032
     dome = [(0, at - 0.0006), (0.9 * r, at - 0.0006), (0.98 * r, at + 0.2 * high), (0.93 * r, at + 0.5 * high)]
     dome += [(0.7 * r, at + 0.83 * high), (0.36 * r, at + 0.97 * high), (0, at + high)]
@@ -205,7 +205,9 @@ def sausage(*, length_m: float, width: float, bend: float) -> Model:
     tip = float(path[-1, 0]) + 0.33 * r
     model.point("end", "tip", "end", (tip, float(path[-1, 1]), 0.0), (1.0, 0.0, 0.0))
     middle = path[len(path) // 2]
-    return model.point("body", "surface", "body", (float(middle[0]), float(middle[1]), r), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "body", "surface", "body", (float(middle[0]), float(middle[1]), r), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("hot dog")
@@ -226,7 +228,7 @@ def hot_dog(*, length_m: float, width: float, sausage: float, sauce_m: float) ->
     model.add("sauce", tube(line, sauce_m, sides=10, across=(0, 0, 1)), "sauce")
     end = float(path[-1, 0])
     model.point("end", "tip", "body", (end, 0.0, lifted), (1.0, 0.0, 0.0))
-    return model.point("body", "surface", "bun", (0.0, -0.5 * w, 0.0), (0.0, -1.0, 0.0)).laid()
+    return model.point("body", "surface", "bun", (0.0, -0.5 * w, 0.0), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("waffle")
@@ -246,4 +248,4 @@ def waffle(*, width_m: float, thick_m: float, cells: float, deep: float) -> Mode
     rib = 0.5 * pitch if count % 2 else 0.0
     model.point("face", "face", "body", (rib, rib, thick_m), (0.0, 0.0, 1.0))
     model.point("edge", "surface", "body", (0.0, -r, 0.5 * thick_m), (0.0, -1.0, 0.0))
-    return model.point("other face", "face", "body", (rib, rib, 0.0), (0.0, 0.0, -1.0)).laid()
+    return model.point("other face", "face", "body", (rib, rib, 0.0), (0.0, 0.0, -1.0)).rest_on_ground()

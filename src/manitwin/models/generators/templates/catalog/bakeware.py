@@ -18,7 +18,7 @@ from manitwin.geometry.solids.shapes import (
     union,
 )
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.vessel import hollowed, shell
+from manitwin.models.generators.templates.catalog.vessel import assemble_from_profile, shell
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -26,9 +26,11 @@ from manitwin.models.generators.templates.template import Model, template
 def cake_pan(*, width_m: float, height: float, taper: float, wall_m: float) -> Model:
     """Build a round pan with a rolled rim; ``taper`` is the width at the foot relative to the rim."""
     r, h = 0.5 * width_m, height * width_m
-    model = hollowed(Model(), rounded([(taper * r, 0.0), (taper * r, 0.002), (r, h)], 0.006), wall_m, wall_m)
+    model = assemble_from_profile(
+        Model(), rounded([(taper * r, 0.0), (taper * r, 0.002), (r, h)], 0.006), wall_m, wall_m
+    )
     roll = torus(r, max(0.002, 1.6 * wall_m), sides=chords(72)).translate((0, 0, h - 0.001))
-    return model.add("rim", roll - cylinder(r - wall_m, 2 * h)).laid()
+    return model.add("rim", roll - cylinder(r - wall_m, 2 * h)).rest_on_ground()
 
 
 def _basin(length_m: float, width_m: float, height_m: float, wall_m: float, slope: float) -> tuple[Manifold, Manifold]:
@@ -140,7 +142,7 @@ def sieve(*, width_m: float, depth: float, handle: float, mesh: float) -> Model:
     middle = grip[12]
     return model.point(
         "handle", "surface", "handle", (float(middle[0]), 0.0, float(middle[2]) + 0.005), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 def _net_holes(r: float, h: float, rows: int) -> Manifold:
@@ -157,7 +159,7 @@ def _net_holes(r: float, h: float, rows: int) -> Manifold:
 def petri_dish(*, width_m: float, height: float, wall_m: float) -> Model:
     """Build a laboratory dish without its lid."""
     r, h = 0.5 * width_m, height * width_m
-    return hollowed(Model(), rounded([(0.985 * r, 0.0), (r, 0.001), (r, h)], 0.001), wall_m, wall_m)
+    return assemble_from_profile(Model(), rounded([(0.985 * r, 0.0), (r, 0.001), (r, h)], 0.001), wall_m, wall_m)
 
 
 @template("graduated cylinder")
@@ -235,7 +237,7 @@ def kitchen_timer(*, width_m: float, height: float, dial: float) -> Model:
     model.add("marks", union(marks), "marks")
     model.point("controls", "surface", "grip", (0.0, 0.0, h), (0.0, 0.0, 1.0))
     model.point("end", "surface", "body", (r, 0.0, 0.3 * h), (1.0, 0.0, 0.0))
-    return model.point("base", "face", "body", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "face", "body", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("scoop")
@@ -281,4 +283,4 @@ def scoop(*, length_m: float, head: float, width: float, deep: float, wall_m: fl
     middle = hand[9]
     return model.point(
         "handle", "surface", "handle", (float(middle[0]), 0.0, float(middle[2]) + 0.72 * t), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()

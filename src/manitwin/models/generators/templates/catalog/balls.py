@@ -14,11 +14,11 @@ def sphere(width_m: float, sides: int = 56) -> Manifold:
     return ellipsoid(width_m, width_m, width_m, sides=chords(sides))
 
 
-def laid_ball(model: Model, width_m: float, top: str = "body", side: str = "body") -> Model:
+def finish_ball(model: Model, width_m: float, top: str = "body", side: str = "body") -> Model:
     """Add points on the top and the side of a ball about the origin, and place it on the ground."""
     r = 0.5 * width_m
     model.point("top", "surface", top, (0.0, 0.0, r), (0.0, 0.0, 1.0))
-    return model.point("side", "surface", side, (0.0, -r, 0.0), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", side, (0.0, -r, 0.0), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("ball")
@@ -29,7 +29,7 @@ def ball(*, width_m: float, stripe: float) -> Model:
     angles = np.concatenate([below, np.linspace(-edge, edge, 7)[1:-1], above])
     model = Model().add("body", lathe(np.column_stack([r * np.cos(angles), r * np.sin(angles)])))
     model.region("stripe", "body", lambda c: np.abs(c[:, 2]) < stripe * r, "stripe")
-    return laid_ball(model, width_m, side="stripe")
+    return finish_ball(model, width_m, side="stripe")
 
 
 @template("baseball")
@@ -53,10 +53,10 @@ def baseball(*, width_m: float, seam_m: float) -> Model:
             path *= (r - 0.25 * seam_m) / np.linalg.norm(path, axis=1)[:, None]
             stitches.append(tube(path, 0.65 * seam_m, sides=6, across=tuple(out)))
     model.add("seam", union(stitches), "seam")
-    return laid_ball(model, width_m)
+    return finish_ball(model, width_m)
 
 
-def _twelve() -> np.ndarray:
+def _icosahedron_corners() -> np.ndarray:
     """Return the corners ``(12, 3)`` of an icosahedron on the unit sphere, one of them at the top."""
     around = np.arange(5) * 2 * np.pi / 5
     z, ring = 1 / np.sqrt(5), 2 / np.sqrt(5)
@@ -67,7 +67,7 @@ def _twelve() -> np.ndarray:
 @template("soccer ball")
 def soccer_ball(*, width_m: float, patch: float) -> Model:
     """Build a soccer ball with twelve pentagons and seams; ``patch`` is a pentagon's radius relative to a regular one."""
-    r, corners = 0.5 * width_m, _twelve()
+    r, corners = 0.5 * width_m, _icosahedron_corners()
     pentagons, seams = [], []
     for a, corner in enumerate(corners):
         near = [b for b in range(12) if 0.3 < corners[b] @ corner < 0.9]
@@ -82,7 +82,7 @@ def soccer_ball(*, width_m: float, patch: float) -> Model:
     model = Model().add("body", sphere(width_m, 72))
     model.add("pentagons", sphere(1.003 * width_m, 72) ^ union(pentagons), "pentagons")
     model.cut("seams", union(seams), "pentagons")
-    return laid_ball(model, 1.003 * width_m, top="pentagons")
+    return finish_ball(model, 1.003 * width_m, top="pentagons")
 
 
 @template("golf ball")
@@ -102,7 +102,7 @@ def golf_ball(*, width_m: float, dimple: float) -> Model:
     for label, at in (("top", top), ("side", side)):
         x, y, up = (float(v) for v in places[at])
         model.point(label, "surface", "dimples", ((r - depth) * x, (r - depth) * y, (r - depth) * up), (x, y, up))
-    return model.laid()
+    return model.rest_on_ground()
 
 
 @template("table tennis ball")
@@ -113,7 +113,7 @@ def table_tennis_ball(*, width_m: float, seam: float) -> Model:
     model.add(
         "seam", lathe([(0, -half), (r + 0.00008, -half), (r + 0.00008, half), (0, half)], sides=chords(56)), "seam"
     )
-    return laid_ball(model, width_m)
+    return finish_ball(model, width_m)
 
 
 @template("marble")
@@ -127,7 +127,7 @@ def marble(*, width_m: float, twist: float) -> Model:
     model.region("top", "body", lambda c: c[:, 2] > 0.9 * r)
     r *= 1.006
     model.point("top", "surface", "bands", (0.0, 0.0, r), (0.0, 0.0, 1.0))
-    return model.point("side", "surface", "body", (0.0, -r, 0.0), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "body", (0.0, -r, 0.0), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("billiard ball")
@@ -135,7 +135,7 @@ def billiard_ball(*, width_m: float, spot: float) -> Model:
     """Build a billiard ball with a white spot at front and back; ``spot`` is its width relative to the ball's."""
     drum = cylinder(0.5 * spot * width_m, 2 * width_m).translate((0, 0, -width_m)).rotate((90, 0, 0))
     model = Model().add("body", sphere(width_m, 64)).add("spot", sphere(1.002 * width_m, 64) ^ drum, "spot")
-    return laid_ball(model, width_m, side="spot")
+    return finish_ball(model, width_m, side="spot")
 
 
 @template("bowling ball")
@@ -151,7 +151,7 @@ def bowling_ball(*, width_m: float, hole: float, span: float) -> Model:
     holes = union([finger.rotate((0, 0, apart / np.sin(span))), finger.rotate((0, 0, -apart / np.sin(span)))])
     thumb = drill.rotate((0, -away, 0))
     model = Model().add("body", sphere(width_m, 72)).cut("holes", holes + thumb, "holes")
-    return laid_ball(model, width_m)
+    return finish_ball(model, width_m)
 
 
 @template("beach ball")
@@ -165,4 +165,4 @@ def beach_ball(*, width_m: float, cap: float) -> Model:
 
     model = Model().add("body", sphere(width_m, 72))
     model.region("stripes", "body", is_coloured, "stripes")
-    return laid_ball(model, width_m)
+    return finish_ball(model, width_m)

@@ -21,7 +21,7 @@ def battery(*, length_m: float, width: float) -> Model:
         .add("body", body.rotate((0, 90, 0)))
         .add("pole", cylinder(0.36 * r, 0.0022).rotate((0, 90, 0)).translate((0.5 * length_m - 0.0022, 0, 0)), "pole")
     )
-    return model.point("pole", "tip", "pole", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0)).laid()
+    return model.point("pole", "tip", "pole", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("9v battery")

@@ -25,19 +25,19 @@ def _stand(height_m: float, radius_m: float, waist: float, collar: float) -> Mod
     ring = [(0, top - 0.022 * h), (1.9 * thin, top - 0.022 * h), (1.9 * thin, top - 0.006 * h)]
     ring += [(1.5 * thin, top + 0.006 * h), (1.5 * thin, top + 0.02 * h), (0, top + 0.02 * h)]
     model.add("collar", lathe(rounded(ring, 0.006 * h)))
-    return _felted(model, r)
+    return _add_felt(model, r)
 
 
-def _felted(model: Model, radius_m: float) -> Model:
+def _add_felt(model: Model, radius_m: float) -> Model:
     model.add("felt", cylinder(0.96 * radius_m, _FELT_M + 0.0005).translate((0, 0, -_FELT_M)), "felt")
     return model.point("base", "face", "felt", (0.0, 0.0, -_FELT_M), (0.0, 0.0, -1.0))
 
 
-def _held(model: Model, height_m: float, radius_m: float, waist: float, collar: float) -> Model:
+def _finish_piece(model: Model, height_m: float, radius_m: float, waist: float, collar: float) -> Model:
     """Add a grasp point on the stem, and place the piece on its felt."""
     at = 0.4 * collar * height_m + 0.3 * 0.4 * height_m
     wide = np.interp(at, [0.3 * height_m, 0.75 * collar * height_m], [1.25 * waist * radius_m, waist * radius_m])
-    return model.point("body", "surface", "body", (0.0, -float(wide), at), (0.0, -1.0, 0.0)).laid()
+    return model.point("body", "surface", "body", (0.0, -float(wide), at), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("chess king")
@@ -56,7 +56,7 @@ def chess_king(*, height_m: float, width: float, crown: float, waist: float, cro
     stood = (flat + heart).translate((0, 0, -0.25 * half)).rotate((90, 0, 0)).translate((0, 0, top - half))
     model.add("cross", stood + cylinder(0.3 * half, 0.5 * half).translate((0, 0, low - 0.1 * half)))
     model.point("top", "tip", "cross", (0.0, 0.0, top), (0.0, 0.0, 1.0))
-    return _held(model, h, r, waist, collar)
+    return _finish_piece(model, h, r, waist, collar)
 
 
 def _turned(outline: list[tuple[float, float]], angle_deg: float) -> np.ndarray:
@@ -87,7 +87,7 @@ def chess_queen(*, height_m: float, width: float, crown: float, waist: float) ->
     model.cut("points", union([bite.rotate((0, 0, 22.5 + 45 * number)) for number in range(8)]))
     model.add("top", ellipsoid(2 * ball, 2 * ball, 2 * ball).translate((0, 0, h - ball)))
     model.point("top", "surface", "top", (0.0, 0.0, h), (0.0, 0.0, 1.0))
-    return _held(model, h, r, waist, collar)
+    return _finish_piece(model, h, r, waist, collar)
 
 
 @template("chess bishop")
@@ -104,7 +104,7 @@ def chess_bishop(*, height_m: float, width: float, mitre: float, waist: float) -
     model.cut("slit", slit.translate((0.28 * wide, 0, start + 0.5 * long)).rotate((0, 0, -90)))
     model.add("top", ellipsoid(2 * ball, 2 * ball, 2 * ball).translate((0, 0, h - ball)))
     model.point("top", "surface", "top", (0.0, 0.0, h), (0.0, 0.0, 1.0))
-    return _held(model, h, r, waist, collar)
+    return _finish_piece(model, h, r, waist, collar)
 
 
 @template("chess rook")
@@ -126,11 +126,11 @@ def chess_rook(*, height_m: float, width: float, tower: float, waist: float) -> 
     model.add("battlements", lathe(rounded([*head, (0, 0.89 * h)], 0.012 * h)))
     gap = box(2 * wide, 0.26 * wide, 0.4 * h).translate((wide, 0, 0.89 * h))
     model.cut("gaps", union([gap.rotate((0, 0, 60 * number)) for number in range(6)]))
-    _felted(model, r)
+    _add_felt(model, r)
     model.point("top", "surface", "battlements", (0.0, -0.84 * wide, h), (0.0, 0.0, 1.0))
     at = 0.42 * h
     side = float(np.interp(at, [0.25 * h, 0.6 * h], [1.16 * thin, thin]))
-    return model.point("body", "surface", "body", (0.0, -side, at), (0.0, -1.0, 0.0)).laid()
+    return model.point("body", "surface", "body", (0.0, -side, at), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("chess knight")
@@ -151,15 +151,17 @@ def chess_knight(*, height_m: float, width: float, neck: float, thick: float) ->
     model.add("head", head).add("mane", mane)
     place = (0.16 * neck * r, 0.81 * h, 0.62 * thick * r)
     eye = ellipsoid(0.055 * h, 0.05 * h, 0.05 * h, sides=chords(20))
-    model.add("eyes", union([_stood(eye.translate((place[0], place[1], side * place[2]))) for side in (-1.0, 1.0)]))
-    _felted(model, r)
+    model.add(
+        "eyes", union([_rotate_upright(eye.translate((place[0], place[1], side * place[2]))) for side in (-1.0, 1.0)])
+    )
+    _add_felt(model, r)
     model.point("top", "tip", "head", (0.0, 0.1 * neck * r, h), (0.0, 0.0, 1.0))
     muzzle = (0.0, -0.95 * neck * r, 0.62 * h)
     model.point("muzzle", "tip", "head", muzzle, (0.0, -0.9, -0.44))
-    return model.laid()
+    return model.rest_on_ground()
 
 
-def _stood(solid: Manifold) -> Manifold:
+def _rotate_upright(solid: Manifold) -> Manifold:
     """Return a solid drawn in x and y with its front towards +X, rotated to stand upright with its front towards -Y."""
     return solid.rotate((90, 0, 0)).rotate((0, 0, -90))
 
@@ -195,7 +197,7 @@ def _horse(height_m: float, long_m: float, half_m: float) -> tuple[Manifold, Man
         ellipsoid(0.34 * n, 0.12 * h, 0.9 * half_m, sides=chords(28)).rotate((0, 0, turn)).translate((n * x, h * z, 0))
         for (x, _, z), turn in zip(crest, np.linspace(12, -44, 7), strict=True)
     ]
-    return _stood(union([flat.warp_batch(swelled), *tips])), _stood(union(locks))
+    return _rotate_upright(union([flat.warp_batch(swelled), *tips])), _rotate_upright(union(locks))
 
 
 def _distance_m(points_m: np.ndarray, outline_m: np.ndarray) -> np.ndarray:

@@ -63,7 +63,7 @@ def spring_clamp(*, length_m: float, spread: float, thick: float, reach: float) 
     model.point("jaws", "tip", "pads", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     model.point("spring joint", "surface", "spring", (joint, 0.7 * coil, 0.5 * z), (0.0, 0.0, 1.0))
     place = (-0.8 * end, half + 0.036 * n, 0.0)
-    return model.point("handles", "surface", "grips", place, (0.0, 1.0, 0.0)).laid()
+    return model.point("handles", "surface", "grips", place, (0.0, 1.0, 0.0)).rest_on_ground()
 
 
 @template("c clamp")
@@ -113,4 +113,6 @@ def c_clamp(*, opening_m: float, throat: float, bar_m: float) -> Model:
     model.point("fixed jaw", "face", "jaw", (right - 0.3 * bar_m, 0.0, 0.0), (-1.0, 0.0, 0.0))
     model.point("pad", "face", "pad", (end + 0.27 * bar_m, 0.0, 0.0), (1.0, 0.0, 0.0))
     model.point("handle", "surface", "handle", (start + 0.3 * bar_m, -0.3 * across, 0.2 * bar_m), (0.0, 0.0, 1.0))
-    return model.point("frame", "surface", "frame", (0.0, deep - 0.5 * bar_m, 0.5 * thick), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "frame", "surface", "frame", (0.0, deep - 0.5 * bar_m, 0.5 * thick), (0.0, 0.0, 1.0)
+    ).rest_on_ground()

@@ -123,7 +123,7 @@ def cap(*, length_m: float, width: float, height: float, visor: float) -> Model:
     model.add("button", ellipsoid(0.016, 0.016, 0.008).translate((0, middle, high)))
     model.point("visor", "edge", "visor", (0.0, out - reach, 0.0045), (0.0, -1.0, 0.0))
     model.point("crown", "surface", "crown", (0.0, middle + 0.3 * deep, 0.8 * high), (0.0, 0.6, 0.8))
-    return model.point("opening", "opening", "inside", (0.0, middle, 0.0), (0.0, 0.0, -1.0)).laid()
+    return model.point("opening", "opening", "inside", (0.0, middle, 0.0), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("suitcase")

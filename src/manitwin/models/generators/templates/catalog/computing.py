@@ -82,7 +82,9 @@ def game_controller(*, length_m: float, depth: float, height: float) -> Model:
     model.point("buttons", "button", "buttons", (0.352 * s, 0.33 * deep, top), (0.0, 0.0, 1.0))
     model.point("stick", "button", "sticks", (-0.28 * s, 0.33 * deep, low + 0.34 * high + 0.006), (0.0, 0.0, 1.0))
     model.point("trigger", "button", "triggers", (0.28 * s, 0.61 * deep, -0.05 * high), (0.0, 1.0, 0.0))
-    return model.point("grip", "surface", "grips", (0.4 * s, -0.37 * deep, 0.22 * high), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "grip", "surface", "grips", (0.4 * s, -0.37 * deep, 0.22 * high), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("webcam")

@@ -7,7 +7,7 @@ from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import box, cylinder, ellipsoid, lathe, prism, rectangle, rounded, torus, union
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.vessel import bulge, ear, shell
+from manitwin.models.generators.templates.catalog.vessel import ear, shell, smooth_profile
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -18,7 +18,7 @@ def kettle(*, height_m: float, width: float, waist: float, spout: float, wall_m:
     ``waist`` is its upper width relative to the lower, ``spout`` the length of the spout relative to the height.
     """
     model, h, r, foot = Model(), 0.86 * height_m, 0.5 * width * height_m, 0.09 * height_m
-    side = bulge([(r, 0.0), (0.99 * r, 0.3 * h), (0.5 * (1 + waist) * r, 0.65 * h), (waist * r, h)])
+    side = smooth_profile([(r, 0.0), (0.99 * r, 0.3 * h), (0.5 * (1 + waist) * r, 0.65 * h), (waist * r, h)])
     profile = [(0.97 * r, 0.0), *side[1:]]
     reach = r + spout * height_m
     path = arc([(-0.45 * r, 0, 0.58 * h), (-0.5 * (r + reach), 0, 0.8 * h), (-reach, 0, 0.98 * h)])
@@ -50,7 +50,7 @@ def kettle(*, height_m: float, width: float, waist: float, spout: float, wall_m:
     out = (float(ahead[0]), 0.0, float(ahead[2]))
     model.point("spout", "tip", "spout", (float(lip[0]), 0.0, float(lip[2])), out)
     model.point("lid", "surface", "lid", (0.0, 0.0, height_m), (0.0, 0.0, 1.0))
-    return model.point("base", "face", "base", (0.0, 0.98 * r, -foot), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "face", "base", (0.0, 0.98 * r, -foot), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("colander")
@@ -77,7 +77,7 @@ def colander(*, width_m: float, height: float, wall_m: float, ears: float) -> Mo
     model.perforate("holes", lambda: _colander_holes(r, high, foot))
     for part in ("body", "inside"):
         model.region("rim", part, lambda centers: centers[:, 2] > 0.965 * high)
-    return model.point("opening", "opening", "rim", (0.0, 0.0, high), (0.0, 0.0, 1.0)).laid()
+    return model.point("opening", "opening", "rim", (0.0, 0.0, high), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 def _colander_holes(r: float, high: float, foot: float) -> Manifold:
@@ -252,7 +252,7 @@ def tea_infuser(*, length_m: float, ball_m: float) -> Model:
     model.cut("inside", ellipsoid(2 * (r - wall), 2 * (r - wall), 2 * (r - wall)).translate((at, 0, 0)), "ball")
     model.perforate("holes", lambda: _infuser_holes(r).rotate((0, 90, 0)).translate((at, 0, 0)), "ball")
     model.point("ball", "surface", "ball", (at, 0.0, r), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (-0.5 * end, 0.0, 0.0065), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (-0.5 * end, 0.0, 0.0065), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 def _infuser_holes(r: float) -> Manifold:

@@ -7,14 +7,14 @@ from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import box, cylinder, ellipsoid, lathe, polygon, prism, rounded, union
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.resting import rested
+from manitwin.models.generators.templates.resting import pitch_to_rest
 from manitwin.models.generators.templates.template import Model, template
 
 SPOON_NECK_HALF_M, FORK_NECK_HALF_M = 0.0042, 0.0045
 """Half the width of a handle where it meets the bowl or the tines, metres."""
 
 
-def slim(
+def slim_handle(
     start_m: float,
     end_m: float,
     half_m: float,
@@ -35,7 +35,7 @@ def slim(
     return tube(path, half_m * tip * (1 + (wide_end - 1) * along**2), flatten=flatten)
 
 
-def arched(arch: float, length_m: float) -> float:
+def arch_height(arch: float, length_m: float) -> float:
     """Return the height of a handle's middle above its ends: -0.03 to 0.07 of the length, and 0 for ``arch`` = 0.3."""
     return 0.1 * (arch - 0.3) * length_m
 
@@ -66,7 +66,7 @@ def _spoon(
     start, end = at - 0.47 * long, -0.5 * length_m
     model.add(
         "handle",
-        slim(start, end, half_m, flatten=flatten, wide_end=wide_end, lift_m=lift * low, arch_m=arch_m).translate(
+        slim_handle(start, end, half_m, flatten=flatten, wide_end=wide_end, lift_m=lift * low, arch_m=arch_m).translate(
             (0, 0, -flatten * half_m)
         ),
         "handle",
@@ -74,7 +74,7 @@ def _spoon(
     model.point("bowl", "opening", "inside", (at, 0.0, 0.0), (0.0, 0.0, 1.0))
     high = 0.85 * lift * low + arch_m * float(np.sin(0.65 * np.pi))
     model.point("handle", "surface", "handle", (0.35 * start + 0.65 * end, 0.0, high), (0.0, 0.0, 1.0))
-    return model.laid()
+    return model.rest_on_ground()
 
 
 @template("spoon")
@@ -82,12 +82,12 @@ def spoon(*, length_m: float, bowl: float, width_m: float, grip: float, arch: fl
     """Build a spoon lying on its bowl.
 
     ``grip`` is the width of the handle's end relative to the length. ``arch`` bends the handle: its middle is below the line
-    through its ends at 0 and above it at 1 (``arched``). ``end`` is the height of the handle's end above the edge of the bowl,
-    relative to the bowl's depth.
+    through its ends at 0 and above it at 1 (``arch_height``). ``end`` is the height of the handle's end above the edge of the
+    bowl, relative to the bowl's depth.
     """
     wide_end = 0.5 * grip * length_m / SPOON_NECK_HALF_M
-    arch_m = arched(arch, length_m)
-    return rested(
+    arch_m = arch_height(arch, length_m)
+    return pitch_to_rest(
         _spoon(length_m, bowl, width_m, 0.22, SPOON_NECK_HALF_M, 0.0012, end, wide_end=wide_end, arch_m=arch_m)
     )
 
@@ -126,14 +126,14 @@ def fork(*, length_m: float, head: float, width_m: float, grip: float, arch: flo
     model = Model().add("tines", head_solid)
     model.add(
         "handle",
-        slim(
+        slim_handle(
             start + 0.02 * length_m,
             -0.5 * length_m,
             FORK_NECK_HALF_M,
             flatten=0.32,
             wide_end=0.5 * grip * length_m / FORK_NECK_HALF_M,
             lift_m=0.004,
-            arch_m=arched(arch, length_m),
+            arch_m=arch_height(arch, length_m),
         ).translate((0, 0, back)),
         "handle",
     )
@@ -141,9 +141,9 @@ def fork(*, length_m: float, head: float, width_m: float, grip: float, arch: flo
     tip = float(-curve[-2]) + 0.5 * thick
     model.point("tines", "tip", "tines", (0.5 * length_m, 0.06 * width_m, tip), (1.0, 0.0, 0.0))
     along = (start + 0.27 * length_m) / (start + 0.52 * length_m)
-    high = 0.004 * float(np.sin(0.5 * np.pi * along)) + arched(arch, length_m) * float(np.sin(np.pi * along))
+    high = 0.004 * float(np.sin(0.5 * np.pi * along)) + arch_height(arch, length_m) * float(np.sin(np.pi * along))
     model.point("handle", "surface", "handle", (-0.25 * length_m, 0.0, back + high + 0.0015), (0.0, 0.0, 1.0))
-    return rested(model)
+    return pitch_to_rest(model)
 
 
 def _knife(length_m: float, blade: float, width_m: float, back_m: float, handle_half_m: float, belly: float) -> Model:
@@ -183,7 +183,7 @@ def _knife(length_m: float, blade: float, width_m: float, back_m: float, handle_
         (start - 0.5 * (length_m - long), 0.2 * width_m, 0.65 * handle_half_m),
         (0.0, 0.0, 1.0),
     )
-    return model.laid()
+    return model.rest_on_ground()
 
 
 @template("chef's knife")
@@ -239,7 +239,7 @@ def spatula(*, length_m: float, head: float, width_m: float, rise: float, crank:
     model.point("edge", "edge", "edge", (at + 0.5 * long, 0.0, 0.001), (1.0, 0.0, 0.0))
     middle = path[22]
     model.point("handle", "surface", "handle", (float(middle[0]), 0.0, float(middle[2]) + 0.005), (0.0, 0.0, 1.0))
-    return rested(model)
+    return pitch_to_rest(model)
 
 
 @template("rolling pin")
@@ -257,7 +257,9 @@ def rolling_pin(*, length_m: float, roller: float, width_m: float) -> Model:
     model.add("handle", knob.rotate((0, 90, 0)).translate((0.5 * long, 0, 0)), "handle")
     model.add("handle", knob.rotate((0, -90, 0)).translate((-0.5 * long, 0, 0)), "handle")
     model.point("roller", "surface", "roller", (0.0, 0.0, 0.5 * width_m), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (0.5 * long + 0.5 * side, 0.0, 0.0135), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (0.5 * long + 0.5 * side, 0.0, 0.0135), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("chopstick")
@@ -269,7 +271,9 @@ def chopstick(*, length_m: float, thick_m: float, tip: float) -> Model:
     model = Model().add("body", tube(path, half, sides=12))
     model.region("tip", "body", lambda centers: centers[:, 0] > 0.49 * length_m)
     model.point("tip", "tip", "tip", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("handle", "surface", "body", (-0.2 * length_m, 0.0, 0.45 * thick_m), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "body", (-0.2 * length_m, 0.0, 0.45 * thick_m), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("whisk")
@@ -291,8 +295,8 @@ def whisk(*, length_m: float, head: float, width_m: float) -> Model:
     )
     wire = tube(loop, 0.0011, across=(0, 0, 1), sides=8)
     model.add("wires", union([wire.rotate((angle, 0, 0)) for angle in (0.0, 36.0, 72.0, 108.0, 144.0)]), "wires")
-    model.add("handle", slim(start + 0.01, -0.5 * length_m, 0.011, flatten=1.0, wide_end=1.15), "handle")
+    model.add("handle", slim_handle(start + 0.01, -0.5 * length_m, 0.011, flatten=1.0, wide_end=1.15), "handle")
     model.point("wires", "tip", "wires", (start + long, 0.0, 0.0), (1.0, 0.0, 0.0))
     return model.point(
         "handle", "surface", "handle", (0.5 * (start - 0.5 * length_m), 0.0, 0.0115), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()

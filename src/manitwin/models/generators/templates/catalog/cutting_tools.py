@@ -62,7 +62,7 @@ def scissors(
     model.point("blade tips", "tip", "blades", (float(tip[0]), float(tip[1]), 0.5 * thick), (1.0, 0.0, 0.0))
     return model.point(
         "blades", "surface", "blades", (at + middle, 0.45 * middle * gape, thick), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("saw")
@@ -92,7 +92,9 @@ def saw(*, length_m: float, width: float, grip: float) -> Model:
         model.add("nuts", nut, "blade")
     model.point("teeth", "edge", "teeth", (0.5 * (start + end), -0.5 * wide, 0.0), (0.0, -1.0, 0.0))
     model.point("blade tip", "tip", "blade", (end, -0.3 * wide, 0.0), (1.0, 0.0, 0.0))
-    return model.point("handle", "surface", "handle", (start - 0.8 * reach, 0.0, 0.011), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (start - 0.8 * reach, 0.0, 0.011), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("drill")
@@ -163,7 +165,7 @@ def utility_knife(*, length_m: float, blade: float, width_m: float) -> Model:
         model.add("slider", rib, "slider")
     model.point("blade", "edge", "edge", (0.5 * (start + end), -0.36 * w, 0.0), (0.0, -1.0, 0.0))
     model.point("slider", "button", "slider", (at, 0.0, 0.5 * thick + 0.003), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (0.5 * back, 0.0, 0.5 * thick), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (0.5 * back, 0.0, 0.5 * thick), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("crowbar")
@@ -197,7 +199,9 @@ def crowbar(*, length_m: float, thick_m: float, hook: float) -> Model:
     )
     low = (-0.38 * length_m - tail * np.cos(slope), tail * np.sin(slope), 0.0)
     model.point("chisel end", "tip", "chisel", (float(low[0]), float(low[1]), 0.0), (-1.0, 0.0, 0.0))
-    return model.point("shaft", "surface", "shaft", (-0.1 * length_m, 0.0, 1.08 * half), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "shaft", "surface", "shaft", (-0.1 * length_m, 0.0, 1.08 * half), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("screw")
@@ -225,4 +229,4 @@ def screw(*, length_m: float, width: float, head: float) -> Model:
     )
     model.cut("recess", cross.translate((-end, 0, 0)))
     model.point("tip", "tip", "shank", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("recess", "hole", "recess", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("recess", "hole", "recess", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()

@@ -10,7 +10,7 @@ from manitwin.geometry.solids.sweep import tube
 from manitwin.models.generators.templates.template import Model, template
 
 
-def _lying(profile: list[Point], sides: int = 32) -> Manifold:
+def _lathe_along_x(profile: list[Point], sides: int = 32) -> Manifold:
     """Return a solid of revolution whose axis lies along X."""
     return lathe(profile, sides=sides).rotate((0, 90, 0))
 
@@ -22,16 +22,16 @@ def pen(*, length_m: float, thick_m: float, tip: float) -> Model:
     start = end - tip * length_m
     model = Model().add(
         "barrel",
-        _lying(
+        _lathe_along_x(
             rounded([(0, -end + 0.008), (r, -end + 0.008), (r, start), (0.0016, end - 0.003), (0, end - 0.003)], 0.002)
         ),
     )
-    model.add("tip", _lying([(0, start), (0.0017, end - 0.006), (0.0004, end), (0, end)]))
-    model.add("button", _lying([(0, -end), (0.55 * r, -end), (0.55 * r, -end + 0.01), (0, -end + 0.01)]), "cap")
+    model.add("tip", _lathe_along_x([(0, start), (0.0017, end - 0.006), (0.0004, end), (0, end)]))
+    model.add("button", _lathe_along_x([(0, -end), (0.55 * r, -end), (0.55 * r, -end + 0.01), (0, -end + 0.01)]), "cap")
     clip = box(0.04, 0.003, 0.0014).translate((-end + 0.032, 0, r + 0.001))
     model.add("clip", clip, "cap").add("clip", box(0.004, 0.003, 0.004).translate((-end + 0.014, 0, r - 0.0018)), "cap")
     model.point("tip", "tip", "tip", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("button", "button", "button", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("button", "button", "button", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("pencil")
@@ -52,7 +52,7 @@ def pencil(*, length_m: float, thick_m: float) -> Model:
     model.add("ferrule", cylinder(1.005 * r, 0.012).rotate((0, 90, 0)).translate((-end + 0.004, 0, 0)), "lead")
     model.add("eraser", cylinder(0.9 * r, 0.006).rotate((0, 90, 0)).translate((-end, 0, 0)), "eraser")
     model.point("point", "tip", "lead", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("eraser", "tip", "eraser", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("eraser", "tip", "eraser", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("marker")
@@ -61,14 +61,15 @@ def marker(*, length_m: float, thick_m: float, cap: float) -> Model:
     end, r = 0.5 * length_m, 0.5 * thick_m
     start = end - cap * length_m
     model = Model().add(
-        "barrel", _lying(rounded([(0, -end), (0.86 * r, -end), (0.86 * r, start + 0.01), (0, start + 0.01)], 0.002))
+        "barrel",
+        _lathe_along_x(rounded([(0, -end), (0.86 * r, -end), (0.86 * r, start + 0.01), (0, start + 0.01)], 0.002)),
     )
-    model.add("cap", _lying(rounded([(0, start), (r, start), (0.94 * r, end), (0, end)], 0.0025)), "cap")
+    model.add("cap", _lathe_along_x(rounded([(0, start), (r, start), (0.94 * r, end), (0, end)], 0.0025)), "cap")
     model.add(
         "clip", box(0.6 * cap * length_m, 0.004, 0.002).translate((start + 0.4 * cap * length_m, 0, r - 0.0006)), "cap"
     )
     model.point("cap", "surface", "cap", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("barrel", "surface", "barrel", (-0.4 * end, 0.0, 0.86 * r), (0.0, 0.0, 1.0)).laid()
+    return model.point("barrel", "surface", "barrel", (-0.4 * end, 0.0, 0.86 * r), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("eraser")
@@ -145,7 +146,7 @@ def notebook(*, length_m: float, width: float, thick_m: float) -> Model:
         )
         rings.append(tube(place[:-1], 0.0007, across=(0, 1, 0), sides=6))
     model.add("spiral", union(rings), "spiral")
-    return model.point("cover", "face", "cover", (0.0, 0.0, thick_m), (0.0, 0.0, 1.0)).laid()
+    return model.point("cover", "face", "cover", (0.0, 0.0, thick_m), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("stapler")
@@ -254,4 +255,4 @@ def picture_frame(*, height_m: float, width: float, border: float) -> Model:
     leg = np.array([(0, 0.62 * height_m * lean, 0.62 * height_m), (0, 0.42 * height_m, 0.0035)])
     model.add("stand", tube(leg, 0.12 * x, flatten=0.04, across=(1, 0, 0)), "frame")
     y = 0.5 * height_m * lean - 0.5 * thick + 0.004
-    return model.point("picture", "face", "picture", (0.0, y, 0.5 * height_m), (0.0, -0.978, 0.208)).laid()
+    return model.point("picture", "face", "picture", (0.0, y, 0.5 * height_m), (0.0, -0.978, 0.208)).rest_on_ground()

@@ -205,7 +205,7 @@ def headphones(*, width_m: float, height: float, cup_m: float) -> Model:
     for side in (-1.0, 1.0):
         cup = lathe(rounded([(0, 0), (0.42 * cup_m, 0), (0.5 * cup_m, 0.014), (0.47 * cup_m, 0.03), (0, 0.03)], 0.006))
         model.add("cups", cup.rotate((0, -90 * side, 0)).translate((side * (half + 0.006), 0, 0.5 * cup_m)), "cups")
-    return model.point("band", "surface", "band", (0.0, 0.0, top + 0.0035), (0.0, 0.0, 1.0)).laid()
+    return model.point("band", "surface", "band", (0.0, 0.0, top + 0.0035), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("light bulb")
@@ -273,7 +273,7 @@ def hair_dryer(*, length_m: float, barrel: float, grip: float) -> Model:
     model.point("switch", "button", "switch", (-0.17 * length_m, -r - 0.3 * reach, 0.29 * r + 0.006), (0.0, 0.0, 1.0))
     return model.point(
         "handle", "surface", "handle", (-0.14 * length_m, -r - 0.75 * reach, 0.315 * r), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("router")

@@ -6,7 +6,7 @@ import numpy as np
 
 from manitwin.geometry.solids.shapes import box, cylinder, lathe, rounded
 from manitwin.models.generators.templates.catalog.cup_shapes import EAR_SHARE, CupSide, cup_ear
-from manitwin.models.generators.templates.catalog.vessel import bulge, hollowed, put_together
+from manitwin.models.generators.templates.catalog.vessel import assemble_from_profile, assemble_vessel, smooth_profile
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -18,7 +18,9 @@ def baby_bottle(*, height_m: float, width: float, body: float, collar: float) ->
     model = Model().add("body", lathe(rounded([(0.0, 0.0), (r, 0.0), (r, 0.86 * top), (0.82 * r, top)], 0.12 * r)))
     model.add("cap", lathe(rounded([(0.0, top), (0.96 * r, top), (0.9 * r, ring), (0.0, ring)], 0.003)), "cap")
     shoulder = ring + 0.35 * (h - ring)
-    teat = bulge([(0.66 * r, ring - 0.002), (0.5 * r, shoulder), (0.2 * r, ring + 0.62 * (h - ring)), (0.17 * r, h)])
+    teat = smooth_profile(
+        [(0.66 * r, ring - 0.002), (0.5 * r, shoulder), (0.2 * r, ring + 0.62 * (h - ring)), (0.17 * r, h)]
+    )
     model.add("teat", lathe(rounded([*teat, (0.0, h)], 0.12 * r)), "teat")
     model.region("base", "body", lambda centers: centers[:, 2] < 0.01 * h)
     model.point("teat", "tip", "teat", (0.0, 0.0, h), (0.0, 0.0, 1.0))
@@ -49,8 +51,8 @@ def carafe(*, height_m: float, width: float, neck: float, flare: float, wall_m: 
     """Build an open jug without a handle: broad below, narrowed to a ``neck``, and widened by ``flare`` at its rim."""
     h, r = height_m, 0.5 * width * height_m
     n = neck * r
-    profile = bulge([(0.8 * r, 0.0), (r, 0.2 * h), (0.86 * r, 0.45 * h), (n, 0.74 * h), (flare * n, h)])
-    return hollowed(Model(), profile, wall_m, 2 * wall_m)
+    profile = smooth_profile([(0.8 * r, 0.0), (r, 0.2 * h), (0.86 * r, 0.45 * h), (n, 0.74 * h), (flare * n, h)])
+    return assemble_from_profile(Model(), profile, wall_m, 2 * wall_m)
 
 
 @template("tea cup")
@@ -77,14 +79,14 @@ def tea_cup(
     model, radius, height = Model(), 0.5 * width_m, rim * width_m
     side = CupSide(radius, height, belly * radius, bottom * height, taper * radius, flare * radius, wall_m)
     grip = cup_ear(model, side, reach_m=handle * height, join=join, hook=hook, thick_m=EAR_SHARE * width_m)
-    return put_together(model, *side.solids(), height, side.foot_m, grip)
+    return assemble_vessel(model, *side.solids(), height, side.foot_m, grip)
 
 
 @template("ramekin")
 def ramekin(*, width_m: float, height: float, taper: float, wall_m: float) -> Model:
     """Build a small baking dish with grooved, nearly straight walls; ``taper`` is the foot's width relative to the rim's."""
     r, high = 0.5 * width_m, height * width_m
-    model = hollowed(Model(), [(taper * r, 0.0), (r, high)], wall_m, 1.4 * wall_m)
+    model = assemble_from_profile(Model(), [(taper * r, 0.0), (r, high)], wall_m, 1.4 * wall_m)
     pitch = 2 * np.pi * r / 40
     lean = float(np.degrees(np.arctan((1 - taper) * r / high)))
     for number in range(40):

@@ -17,7 +17,7 @@ from manitwin.geometry.solids.shapes import (
     union,
 )
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.organic import lying
+from manitwin.models.generators.templates.catalog.organic import lay_along_x
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -26,15 +26,15 @@ def nail(*, length_m: float, width: float, head: float) -> Model:
     """Build a lying nail with its tip towards +X; ``width`` of the shank is relative to the length, ``head`` to the shank."""
     r, end = 0.5 * width * length_m, 0.5 * length_m
     shank = [(r, -end + 0.8 * r), (r, end - 4.4 * r), (0.12 * r, end)]
-    model = Model().add("shank", lying(lathe([(0, -end + 0.8 * r), *shank, (0, end)], sides=chords(20))))
+    model = Model().add("shank", lay_along_x(lathe([(0, -end + 0.8 * r), *shank, (0, end)], sides=chords(20))))
     cap = rounded(
         [(0, -end), (head * r, -end), (head * r, -end + 0.7 * r), (r, -end + 1.6 * r), (0, -end + 1.6 * r)], 0.2 * r
     )
-    model.add("head", lying(lathe(cap, sides=chords(28))))
+    model.add("head", lay_along_x(lathe(cap, sides=chords(28))))
     model.region("tip", "shank", lambda c: c[:, 0] > end - 4.4 * r)
     model.point("tip", "tip", "tip", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     model.point("shank", "surface", "shank", (0.0, 0.0, r), (0.0, 0.0, 1.0))
-    return model.point("head", "face", "head", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("head", "face", "head", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 def _rod(model: Model, length_m: float, radius_m: float) -> Model:
@@ -42,7 +42,7 @@ def _rod(model: Model, length_m: float, radius_m: float) -> Model:
     end = 0.5 * length_m
     model.point("end", "surface", "body", (end - 0.001, 0.0, radius_m), (0.0, 0.0, 1.0))
     model.point("middle", "surface", "body", (0.0, 0.0, radius_m), (0.0, 0.0, 1.0))
-    return model.point("other end", "surface", "body", (-end + 0.001, 0.0, radius_m), (0.0, 0.0, 1.0)).laid()
+    return model.point("other end", "surface", "body", (-end + 0.001, 0.0, radius_m), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("dowel")
@@ -54,9 +54,9 @@ def dowel(*, length_m: float, width_m: float, grooves: float) -> Model:
         [(0, -end), (r - bevel, -end), (r, -end + bevel), (r, end - bevel), (r - bevel, end), (0, end)],
         sides=chords(40),
     )
-    model, count = Model().add("body", lying(body)), round(grooves)
+    model, count = Model().add("body", lay_along_x(body)), round(grooves)
     if count >= 6:
-        bar = lying(cylinder(0.06 * r, 2 * length_m, sides=8)).translate((-length_m, 0, r))
+        bar = lay_along_x(cylinder(0.06 * r, 2 * length_m, sides=8)).translate((-length_m, 0, r))
         model.cut("grooves", union([bar.rotate((360 * (k + 0.5) / count, 0, 0)) for k in range(count)]))
     return _rod(model, length_m, r)
 
@@ -65,8 +65,8 @@ def dowel(*, length_m: float, width_m: float, grooves: float) -> Model:
 def pipe(*, length_m: float, width_m: float, wall: float) -> Model:
     """Build a lying piece of pipe; ``wall`` is the wall thickness relative to the width."""
     r = 0.5 * width_m
-    body = lying(cylinder(r, length_m, sides=chords(48))).translate((-0.5 * length_m, 0, 0))
-    hole = lying(cylinder((0.5 - wall) * width_m, 2 * length_m, sides=chords(48))).translate((-length_m, 0, 0))
+    body = lay_along_x(cylinder(r, length_m, sides=chords(48))).translate((-0.5 * length_m, 0, 0))
+    hole = lay_along_x(cylinder((0.5 - wall) * width_m, 2 * length_m, sides=chords(48))).translate((-length_m, 0, 0))
     return _rod(Model().add("body", body).cut("inside", hole), length_m, r)
 
 
@@ -128,7 +128,7 @@ def spring(*, length_m: float, width: float, wire: float, turns: float) -> Model
     places = {"end": float(path[-1 - 13, 0]), "other end": float(path[13, 0])}
     for label, x in places.items():
         model.point(label, "surface", "ends", (x, -r - t, 0.0), (0.0, -1.0, 0.0))
-    return model.point("middle", "axis", "body", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)).laid()
+    return model.point("middle", "axis", "body", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("hinge")
@@ -154,7 +154,9 @@ def hinge(*, height_m: float, width: float, thick_m: float, pin_m: float) -> Mod
     at = [(side * (0.55 + 0.2 * (k % 2)) * w, (k - 1) * 0.34 * height_m) for side in (-1, 1) for k in range(3)]
     model.cut("holes", union([hole.translate((*place, 0)) for place in at]), "pin")
     model.point("leaf", "face", "body", (0.5 * w, 0.17 * height_m, thick_m - r), (0.0, 0.0, 1.0))
-    return model.point("edge", "surface", "body", (w + 0.4 * r, 0.0, 0.5 * thick_m - r), (1.0, 0.0, 0.0)).laid()
+    return model.point(
+        "edge", "surface", "body", (w + 0.4 * r, 0.0, 0.5 * thick_m - r), (1.0, 0.0, 0.0)
+    ).rest_on_ground()
 
 
 @template("carabiner")
@@ -183,7 +185,7 @@ def carabiner(*, length_m: float, width: float, thick: float, taper: float) -> M
     model.point("top", "surface", "gate", (float(middle[0]), float(middle[1]), 1.16 * t), (0.0, 0.0, 1.0))
     far = loop[int(loop[:, 0].argmax())]
     model.point("end", "surface", "body", (float(far[0]) + t, float(far[1]), 0.0), (1.0, 0.0, 0.0))
-    return model.point("base", "surface", "body", (float(far[0]), float(far[1]), -t), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "surface", "body", (float(far[0]), float(far[1]), -t), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("chalk")
@@ -191,11 +193,11 @@ def chalk(*, length_m: float, width_m: float, taper: float) -> Model:
     """Build a lying stick of chalk, worn at the end towards +X; ``taper`` is the relative width there."""
     r, end = 0.5 * width_m, 0.5 * length_m
     body = rounded([(0, -end), (r, -end), (r, 0.1 * length_m), (taper * r, end), (0, end)], 0.0012)
-    model = Model().add("body", lying(lathe(body, sides=chords(32))))
+    model = Model().add("body", lay_along_x(lathe(body, sides=chords(32))))
     model.region("tip", "body", lambda c: c[:, 0] > 0.42 * length_m)
     model.point("tip", "surface", "tip", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     model.point("barrel", "surface", "body", (-0.1 * length_m, 0.0, r), (0.0, 0.0, 1.0))
-    return model.point("blunt end", "face", "body", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("blunt end", "face", "body", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("spinning top")
@@ -224,7 +226,7 @@ def spinning_top(*, width_m: float, tall: float, peg: float, stem: float) -> Mod
     model.point("top", "surface", "rim", (r * up - at * across, 0.0, at * up + r * across), (up, 0.0, across))
     return model.point(
         "base", "surface", "rim", (-r * up - at * across, 0.0, at * up - r * across), (-up, 0.0, -across)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("bauble")
@@ -240,13 +242,13 @@ def bauble(*, width_m: float, cap: float, loop: float) -> Model:
     ring = torus(0.5 * loop * width_m, 0.0009, sides=chords(28)).rotate((90, 0, 0))
     model.add("loop", ring.translate((0, 0, z + 0.13 * r + 0.45 * loop * width_m)), "cap")
     model.point("top", "surface", "cap", (0.0, -0.7 * cap * r, z + 0.13 * r), (0.0, 0.0, 1.0))
-    return model.point("side", "surface", "body", (0.0, -r, 0.0), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "body", (0.0, -r, 0.0), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("cardboard tube")
 def cardboard_tube(*, length_m: float, width_m: float, wall_m: float) -> Model:
     """Build a lying cardboard tube."""
     r = 0.5 * width_m
-    body = lying(cylinder(r, length_m, sides=chords(48))).translate((-0.5 * length_m, 0, 0))
-    hole = lying(cylinder(r - wall_m, 2 * length_m, sides=chords(48))).translate((-length_m, 0, 0))
+    body = lay_along_x(cylinder(r, length_m, sides=chords(48))).translate((-0.5 * length_m, 0, 0))
+    hole = lay_along_x(cylinder(r - wall_m, 2 * length_m, sides=chords(48))).translate((-length_m, 0, 0))
     return _rod(Model().add("body", body).cut("inside", hole, "inside"), length_m, r)

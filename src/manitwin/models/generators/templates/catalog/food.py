@@ -7,7 +7,13 @@ from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import chords, cylinder, ellipsoid, lathe, union
 from manitwin.geometry.solids.sweep import arc, sweep, tube
-from manitwin.models.generators.templates.catalog.organic import leaves, lying, ribbed, stalk, turned
+from manitwin.models.generators.templates.catalog.organic import (
+    lay_along_x,
+    leaves,
+    scale_radially,
+    smooth_revolution,
+    stalk,
+)
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -18,24 +24,24 @@ def apple(*, width_m: float, tall: float, shoulder: float, stem_m: float) -> Mod
     low, high = 0.9 - 0.5 * (shoulder - 1), 0.95 + 0.3 * (shoulder - 1)
     profile = [(0, 0.08), (0.16, 0.045), (0.34, 0.0), (0.66 * low / 0.9, 0.08), (low, 0.3), (1, 0.58)]
     profile += [(high, 0.78), (0.74, 0.95), (0.48, 1.0), (0.24, 0.95), (0.08, 0.84), (0, 0.82)]
-    body = ribbed(turned(profile, width_m, h, sides=60), lambda angle: 1 + 0.012 * np.cos(5 * angle))
+    body = scale_radially(smooth_revolution(profile, width_m, h, sides=60), lambda angle: 1 + 0.012 * np.cos(5 * angle))
     top = 0.82 * h + stem_m
     model = Model().add("body", body)
     model.region("dimple", "body", lambda c: (np.hypot(c[:, 0], c[:, 1]) < 0.36 * r) & (c[:, 2] > 0.7 * h))
     model.add("stem", stalk([(0, 0, 0.78 * h), (0.04 * r, 0, 0.9 * h), (0.18 * r, 0, top)], 0.0013, 0.0019), "stem")
     model.point("stem end", "tip", "stem", (0.18 * r, 0.0, top), (0.25, 0.0, 0.968))
-    return model.point("side", "surface", "body", (0.0, -r, 0.58 * h), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "body", (0.0, -r, 0.58 * h), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 def citrus(width_m: float, tall: float, mark: float) -> Model:
     """Build a round citrus fruit with the mark of its stem on top; ``mark`` is its relative width."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.02), (0.3, 0.015), (0.62, 0.11), (0.9, 0.3), (1, 0.5), (0.9, 0.7), (0.62, 0.89), (0.3, 0.985)]
-    model = Model().add("body", turned([*profile, (0.1, 0.985), (0, 0.975)], width_m, h))
-    star = ribbed(cylinder(mark * r, 0.02 * h, sides=chords(40)), lambda angle: 1 + 0.25 * np.cos(5 * angle))
+    model = Model().add("body", smooth_revolution([*profile, (0.1, 0.985), (0, 0.975)], width_m, h))
+    star = scale_radially(cylinder(mark * r, 0.02 * h, sides=chords(40)), lambda angle: 1 + 0.25 * np.cos(5 * angle))
     model.add("stem", star.translate((0, 0, 0.97 * h)), "stem")
     model.point("upper side", "surface", "stem", (0.0, 0.0, 0.99 * h), (0.0, 0.0, 1.0))
-    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("orange")
@@ -59,11 +65,13 @@ def lemon(*, length_m: float, width: float, nipple: float) -> Model:
         (0.6, waist - 0.06),
     ]
     profile += [(0.34, waist), (0.22, 1 - 0.45 * nipple), (0.13, 1 - 0.1 * nipple), (0, 1)]
-    model = Model().add("body", lying(turned(profile, wide, length_m).translate((0, 0, -0.5 * length_m))))
-    scar = lying(cylinder(0.07 * wide, 0.02 * length_m, sides=chords(16)))
+    model = Model().add(
+        "body", lay_along_x(smooth_revolution(profile, wide, length_m).translate((0, 0, -0.5 * length_m)))
+    )
+    scar = lay_along_x(cylinder(0.07 * wide, 0.02 * length_m, sides=chords(16)))
     model.add("stem", scar.translate((-0.51 * length_m, 0, 0)), "stem")
     model.point("side", "surface", "body", (0.0, -0.5 * wide, 0.0), (0.0, -1.0, 0.0))
-    return model.point("upper side", "surface", "body", (0.0, 0.0, 0.5 * wide), (0.0, 0.0, 1.0)).laid()
+    return model.point("upper side", "surface", "body", (0.0, 0.0, 0.5 * wide), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("peach")
@@ -71,7 +79,7 @@ def peach(*, width_m: float, tall: float, cleft: float) -> Model:
     """Build a peach with the stem cavity on top and a cleft in front."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.0), (0.25, 0.012), (0.6, 0.1), (0.9, 0.3), (1, 0.55), (0.9, 0.79), (0.66, 0.95), (0.42, 1.0)]
-    body = turned([*profile, (0.18, 0.95), (0.05, 0.89), (0, 0.88)], width_m, h, sides=96)
+    body = smooth_revolution([*profile, (0.18, 0.95), (0.05, 0.89), (0, 0.88)], width_m, h, sides=96)
 
     def cleaved(angle: np.ndarray) -> np.ndarray:
         off = np.abs(np.angle(np.exp(1j * (angle + 0.5 * np.pi))))
@@ -79,10 +87,10 @@ def peach(*, width_m: float, tall: float, cleft: float) -> Model:
             1 - cleft * np.exp(-((off / 0.13) ** 2)) + 0.35 * cleft * np.exp(-(((off - 0.45) / 0.3) ** 2))
         )
 
-    model = Model().add("body", ribbed(body, cleaved))
+    model = Model().add("body", scale_radially(body, cleaved))
     model.add("stem", cylinder(0.06 * r, 0.09 * h, sides=chords(12)).translate((0, 0, 0.85 * h)), "stem")
     model.point("upper side", "surface", "stem", (0.0, 0.0, 0.94 * h), (0.0, 0.0, 1.0))
-    return model.point("side", "surface", "body", (r, 0.0, 0.55 * h), (1.0, 0.0, 0.0)).laid()
+    return model.point("side", "surface", "body", (r, 0.0, 0.55 * h), (1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("pear")
@@ -97,11 +105,11 @@ def pear(*, height_m: float, width: float, neck: float, stem_m: float) -> Model:
         (0.5 * neck, 0.975),
         (0.2 * neck, 0.985),
     ]
-    model = Model().add("body", turned([*profile, (0, 0.96)], wide, h))
+    model = Model().add("body", smooth_revolution([*profile, (0, 0.96)], wide, h))
     end = (0.006, 0.0, h + stem_m)
     model.add("stem", stalk([(0, 0, 0.93 * h), (0.0005, 0, h), end], 0.0015, 0.002), "stem")
     model.point("stem end", "tip", "stem", end, (0.3, 0.0, 0.954))
-    return model.point("side", "surface", "body", (0.0, -0.5 * wide, 0.34 * h), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "body", (0.0, -0.5 * wide, 0.34 * h), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("tomato")
@@ -109,14 +117,14 @@ def tomato(*, width_m: float, tall: float, ribs: float, leaf: float) -> Model:
     """Build a tomato with its sepals on top; ``ribs`` is the depth of its ribs."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.0), (0.35, 0.01), (0.72, 0.13), (0.95, 0.35), (1, 0.52), (0.93, 0.75), (0.7, 0.94), (0.42, 1.0)]
-    body = turned([*profile, (0.18, 0.955), (0, 0.9)], width_m, h, sides=80)
-    model = Model().add("body", ribbed(body, lambda angle: 1 + ribs * np.cos(6 * angle)))
+    body = smooth_revolution([*profile, (0.18, 0.955), (0, 0.9)], width_m, h, sides=80)
+    model = Model().add("body", scale_radially(body, lambda angle: 1 + ribs * np.cos(6 * angle)))
     outline = [(0.0, 0.95 * h), (0.4 * leaf * r, 0.995 * h), (0.72 * leaf * r, 1.01 * h), (leaf * r, 1.08 * h)]
     model.add("leaves", leaves(5, outline, 0.12 * r, 0.0018), "leaves")
     end = (0.1 * r, 0.0, h + 0.2 * r)
     model.add("stem", stalk([(0, 0, 0.88 * h), (0.01 * r, 0, h), end], 0.002, 0.0026), "leaves")
     model.point("stem end", "tip", "stem", end, (0.4, 0.0, 0.917))
-    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("pumpkin")
@@ -124,8 +132,8 @@ def pumpkin(*, width_m: float, tall: float, ribs: float, stem: float) -> Model:
     """Build a pumpkin with ten ribs; ``stem`` is the stem's height relative to the width."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.09), (0.18, 0.05), (0.42, 0.0), (0.76, 0.1), (0.96, 0.32), (1, 0.5), (0.95, 0.7), (0.74, 0.91)]
-    body = turned([*profile, (0.46, 1.0), (0.22, 0.95), (0, 0.89)], width_m, h, sides=120)
-    model = Model().add("body", ribbed(body, lambda angle: 1 - ribs * (1 - np.abs(np.sin(5 * angle)) ** 0.7)))
+    body = smooth_revolution([*profile, (0.46, 1.0), (0.22, 0.95), (0, 0.89)], width_m, h, sides=120)
+    model = Model().add("body", scale_radially(body, lambda angle: 1 - ribs * (1 - np.abs(np.sin(5 * angle)) ** 0.7)))
     top = (0.2 * r, 0.0, 0.9 * h + stem * width_m)
     path = arc(
         [(0, 0, 0.86 * h), (0.02 * r, 0, 0.97 * h), (0.09 * r, 0, 0.94 * h + 0.6 * stem * width_m), top], samples=14
@@ -135,7 +143,7 @@ def pumpkin(*, width_m: float, tall: float, ribs: float, stem: float) -> Model:
     section = (1 + 0.035 * np.cos(5 * angles))[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
     model.add("stem", sweep(path, section, half), "stem")
     model.point("stem end", "tip", "stem", top, (0.5, 0.0, 0.866))
-    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("onion")
@@ -143,16 +151,16 @@ def onion(*, width_m: float, tall: float, neck: float) -> Model:
     """Build an onion that stands on its roots; ``neck`` is the height of its dry neck relative to the width."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.0), (0.22, 0.0), (0.6, 0.1), (0.92, 0.33), (1, 0.5), (0.9, 0.7), (0.62, 0.87), (0.3, 0.97)]
-    model = Model().add("body", turned([*profile, (0.14, 1.02), (0, 1.04)], width_m, h))
+    model = Model().add("body", smooth_revolution([*profile, (0.14, 1.02), (0, 1.04)], width_m, h))
     dry = [(0, 0.9 * h), (0.3 * r, 0.955 * h), (0.15 * r, 1.03 * h), (0.11 * r, h + 0.6 * neck * width_m)]
     end = h + neck * width_m
     outline = np.array([*dry, (0.16 * r, end), (0, end - 0.004)])
-    tuft = ribbed(lathe(outline, sides=chords(40)), lambda angle: 1 + 0.12 * np.cos(7 * angle))
+    tuft = scale_radially(lathe(outline, sides=chords(40)), lambda angle: 1 + 0.12 * np.cos(7 * angle))
     model.add("stem", tuft, "stem")
     root = cylinder(0.0011, 0.009, top_radius_m=0.002, sides=8).translate((0, 0, -0.006)).rotate((0, 14, 0))
     model.add("roots", union([root.translate((-0.001, 0, 0.002)).rotate((0, 0, 60 * k)) for k in range(6)]), "roots")
     model.point("stem end", "tip", "stem", (0.0, 0.0, end - 0.004), (0.0, 0.0, 1.0))
-    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("banana")
@@ -174,7 +182,9 @@ def banana(*, length_m: float, width: float, bend: float, stem: float) -> Model:
     out = (float(np.cos(0.5 * bend)), -float(np.sin(0.5 * bend)), 0.0)
     model.point("stem", "tip", "stem", (float(end[0]), float(end[1]), 0.0), out)
     model.point("body", "surface", "body", (float(curve[middle, 0]), float(curve[middle, 1]), r), (0.0, 0.0, 1.0))
-    return model.point("tip", "tip", "tip", (float(start[0]), float(start[1]), 0.0), (-out[0], out[1], 0.0)).laid()
+    return model.point(
+        "tip", "tip", "tip", (float(start[0]), float(start[1]), 0.0), (-out[0], out[1], 0.0)
+    ).rest_on_ground()
 
 
 _BANANA = [0.2, 0.32, 0.62, 0.88, 1.0, 1.0, 0.85, 0.52, 0.3, 0.27]
@@ -200,7 +210,7 @@ def carrot(*, length_m: float, width: float, taper: float, tops_m: float) -> Mod
         model.add("stem", stalk(bent, 0.1 * r + 0.001, 0.08 * r + 0.0006, sides=8), "stem")
     model.point("stem", "surface", "stem", (crown + 0.002, 0.0, 0.25 * r), (0.0, 0.0, 1.0))
     model.point("body", "surface", "body", (0.0, 0.0, float(np.interp(0.5, along, half))), (0.0, 0.0, 1.0))
-    return model.point("tip", "tip", "tip", (-0.5 * length_m, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("tip", "tip", "tip", (-0.5 * length_m, 0.0, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("eggplant")
@@ -222,13 +232,15 @@ def eggplant(*, length_m: float, width: float, neck: float, bend: float, stem_m:
     n = 1.06 * neck * r
     outline = [(0.0, 0.01), (0.6 * n, 0.006), (n, -0.012), (1.06 * n, -0.05 * length_m), (1.12 * n, -0.11 * length_m)]
     cap = leaves(6, outline, 0.5 * n, 0.003)
-    model.add("leaves", lying(cap).translate((x, y, 0)), "leaves")
+    model.add("leaves", lay_along_x(cap).translate((x, y, 0)), "leaves")
     top = (x + stem_m, y - 0.2 * stem_m, 0.0)
     model.add("stem", stalk([(x - 0.004, y, 0), (x + 0.5 * stem_m, y, 0), top], 0.0055, 0.0045), "leaves")
     model.point("stem", "tip", "stem", top, (0.96, -0.28, 0.0))
     at = 14
     model.point("body", "surface", "body", (float(path[at, 0]), float(path[at, 1]), float(half[at])), (0.0, 0.0, 1.0))
-    return model.point("tip", "tip", "tip", (-0.5 * length_m, float(path[0, 1]), 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point(
+        "tip", "tip", "tip", (-0.5 * length_m, float(path[0, 1]), 0.0), (-1.0, 0.0, 0.0)
+    ).rest_on_ground()
 
 
 @template("strawberry")
@@ -236,7 +248,7 @@ def strawberry(*, length_m: float, width: float, taper: float, leaf: float) -> M
     """Build a strawberry lying on its side with its tip towards +X; ``taper`` is its relative width below its middle."""
     wide = width * length_m
     profile = [(0, 0.02), (0.45, 0.0), (0.82, 0.07), (1, 0.24), (0.94, 0.45), (taper, 0.7), (0.36, 0.92), (0.16, 0.985)]
-    body = turned([*profile, (0, 1.0)], wide, length_m)
+    body = smooth_revolution([*profile, (0, 1.0)], wide, length_m)
     outline = [(0, -0.01 * length_m), (0.3 * wide, -0.03 * length_m), (0.45 * leaf * wide, 0.0)]
     green = leaves(9, [*outline, (0.56 * leaf * wide, -0.06 * length_m)], 0.085 * wide, 0.0012)
     edge = arc([(r, 0, z) for r, z in [*profile, (0, 1.0)]], samples=60)[20:, [0, 2]]
@@ -250,7 +262,7 @@ def strawberry(*, length_m: float, width: float, taper: float, leaf: float) -> M
     tilt = float(np.degrees(np.arctan2(0.5 * wide * (1 - taper), 0.46 * length_m)))
 
     def laid(solid: Manifold) -> Manifold:
-        return lying(solid.translate((0, 0, -0.45 * length_m))).rotate((0, 0.9 * tilt, 0))
+        return lay_along_x(solid.translate((0, 0, -0.45 * length_m))).rotate((0, 0.9 * tilt, 0))
 
     model = (
         Model().add("body", laid(body)).add("seeds", laid(union(seeds)), "seeds").add("leaves", laid(green), "leaves")
@@ -263,4 +275,6 @@ def strawberry(*, length_m: float, width: float, taper: float, leaf: float) -> M
     model.point(
         "stem end", "tip", "stem", (float(end[0]), 0.0, float(end[2])), (-float(np.cos(a)), 0.0, float(np.sin(a)))
     )
-    return model.point("side", "surface", "body", (-0.2 * length_m, -0.5 * wide, 0.0), (0.0, -1.0, 0.0)).laid()
+    return model.point(
+        "side", "surface", "body", (-0.2 * length_m, -0.5 * wide, 0.0), (0.0, -1.0, 0.0)
+    ).rest_on_ground()

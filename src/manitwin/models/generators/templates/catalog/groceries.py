@@ -18,8 +18,8 @@ from manitwin.geometry.solids.shapes import (
     union,
 )
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.organic import lying, ribbed
-from manitwin.models.generators.templates.catalog.rings import ring_radii, with_both_sides
+from manitwin.models.generators.templates.catalog.organic import lay_along_x, scale_radially
+from manitwin.models.generators.templates.catalog.rings import finish_ring, ring_radii
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -29,12 +29,12 @@ def egg(*, length_m: float, width: float, blunt: float) -> Model:
     angle = np.linspace(0, np.pi, 32)
     wide = 0.5 * width * length_m * np.sin(angle) * (1 + 0.5 * blunt * np.cos(angle)) / (1 + 0.06 * blunt**2)
     solid = lathe(np.column_stack([wide, -0.5 * length_m * np.cos(angle)]), sides=chords(48))
-    model = Model().add("body", lying(solid))
+    model = Model().add("body", lay_along_x(solid))
     model.region("tip", "body", lambda c: c[:, 0] > 0.42 * length_m)
     at = -0.12 * length_m
     r = 0.5 * width * length_m
     model.point("side", "surface", "body", (at, -r, 0.0), (0.0, -1.0, 0.0))
-    return model.point("upper side", "surface", "body", (at, 0.0, r), (0.0, 0.0, 1.0)).laid()
+    return model.point("upper side", "surface", "body", (at, 0.0, r), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("potato")
@@ -73,7 +73,7 @@ def potato(*, length_m: float, width: float, thick: float, lumps: float) -> Mode
     model.region("base", "body", lambda c: c[:, 2] < low[2] + 0.02 * length_m)
     top = surface[int(surface[:, 2].argmax())]
     model.point("top", "surface", "body", (float(top[0]), float(top[1]), float(high[2])), (0.0, 0.0, 1.0))
-    return model.laid()
+    return model.rest_on_ground()
 
 
 @template("mushroom")
@@ -97,7 +97,7 @@ def mushroom(*, width_m: float, tall: float, dome: float, stem: float) -> Model:
         "gills", "body", lambda c: (c[:, 2] < low + 0.09 * h) & (np.hypot(c[:, 0], c[:, 1]) < 0.86 * r), "gills"
     )
     model.point("top", "surface", "body", (0.0, 0.0, h), (0.0, 0.0, 1.0))
-    return model.point("stem", "surface", "stem", (0.0, -0.98 * thick, 0.5 * low), (0.0, -1.0, 0.0)).laid()
+    return model.point("stem", "surface", "stem", (0.0, -0.98 * thick, 0.5 * low), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("donut")
@@ -108,7 +108,7 @@ def donut(*, width_m: float, thick: float, hole: float, glaze: float) -> Model:
     flat = h / (2 * half)
     body = torus(ring, half, sides=chords(60)).scale((1, 1, flat))
     cover = torus(ring, half + 0.0011, sides=chords(60)).scale((1, 1, (0.5 * h + 0.0011) / (half + 0.0011)))
-    floor = ribbed(
+    floor = scale_radially(
         cylinder(0.9 * r, h, sides=chords(72)), lambda angle: 1 + 0.05 * np.sin(7 * angle) + 0.03 * np.sin(4 * angle)
     )
     edge = floor.translate((0, 0, 0.5 * h * (1 - glaze)))
@@ -121,7 +121,7 @@ def donut(*, width_m: float, thick: float, hole: float, glaze: float) -> Model:
         crumb = box(0.0046, 0.0014, 0.0014, radius_m=0.0004).rotate((0, 0, 97.0 * number)).rotate((0, tilt, 0))
         crumbs[int(1.618 * number) % 2].append(crumb.translate((ring + off, 0, z)).rotate((0, 0, float(np.degrees(a)))))
     model.add("sprinkles", union(crumbs[0]), "sprinkles").add("more sprinkles", union(crumbs[1]), "more sprinkles")
-    return with_both_sides(model, width_m, hole, hole_share=0.4)
+    return finish_ring(model, width_m, hole, hole_share=0.4)
 
 
 @template("cookie")
@@ -129,7 +129,7 @@ def cookie(*, width_m: float, thick: float, chips: float) -> Model:
     """Build a lying round cookie with chocolate chips; ``chips`` is their width relative to the cookie's."""
     r, h = 0.5 * width_m, thick * width_m
     profile = [(0, 0), (0.93 * r, 0), (r, 0.35 * h), (0.92 * r, 0.7 * h), (0.6 * r, 0.94 * h), (0, h)]
-    body = ribbed(
+    body = scale_radially(
         lathe(rounded(profile, 0.3 * h)), lambda angle: 1 + 0.012 * np.sin(5 * angle) + 0.01 * np.sin(8 * angle + 1)
     )
     model = Model().add("body", body)
@@ -188,7 +188,9 @@ def chocolate_bar(*, length_m: float, width: float, thick_m: float, wrapped: flo
     model.add("foil", foil.translate((reach - 0.5 * length_m + 0.004, 0, -0.5 * paper)), "foil")
     at = 0.5 * (reach - length_m)
     model.point("front", "face", "wrapper", (at, 0.0, thick_m + paper), (0.0, 0.0, 1.0))
-    return model.point("edge", "surface", "wrapper", (at, -0.5 * y - paper, 0.5 * thick_m), (0.0, -1.0, 0.0)).laid()
+    return model.point(
+        "edge", "surface", "wrapper", (at, -0.5 * y - paper, 0.5 * thick_m), (0.0, -1.0, 0.0)
+    ).rest_on_ground()
 
 
 @template("cheese")

@@ -47,7 +47,7 @@ def hammer(*, length_m: float, head: float, face_m: float) -> Model:
     model.add("handle", grip(-0.5 * length_m, at + 0.2 * face_m, 0.016), "handle")
     model.point("striking face", "face", "face", (at, -0.44 * across, 0.0), (0.0, -1.0, 0.0))
     model.point("claw", "tip", "claw", (at + 0.25 * face_m, 0.54 * across, 0.0), (0.0, 1.0, 0.0))
-    return model.point("handle", "surface", "handle", (-0.2 * length_m, 0.0, 0.014), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (-0.2 * length_m, 0.0, 0.014), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("screwdriver")
@@ -70,7 +70,7 @@ def screwdriver(*, length_m: float, handle: float, grip_m: float, shaft_m: float
     model.point("tip", "tip", "tip", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0))
     return model.point(
         "handle", "surface", "handle", (0.5 * (end + middle), 0.0, 0.515 * grip_m), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("wrench")
@@ -93,7 +93,7 @@ def wrench(*, length_m: float, head: float, jaw: float, thick_m: float) -> Model
     model.cut("jaw", gap).cut("hole", hexagon)
     model.point("jaw", "hole", "jaw", (at + 0.1 * wide, 0.0, 0.0), (0.0, 0.0, 1.0))
     model.point("ring", "hole", "hole", (ring, 0.0, 0.0), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (0.0, 0.0, 0.35 * thick_m), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (0.0, 0.0, 0.35 * thick_m), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("allen key")
@@ -107,7 +107,7 @@ def allen_key(*, length_m: float, arm: float, thick: float) -> Model:
     model = Model().add("body", tube(path, half, sides=6, across=(0, 0, 1)))
     model.region("tip", "body", lambda centers: centers[:, 0] < -0.499 * length_m)
     model.point("tip", "tip", "tip", (-0.5 * length_m, 0.0, 0.0), (-1.0, 0.0, 0.0))
-    return model.point("handle", "surface", "body", (0.0, 0.0, half), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "body", (0.0, 0.0, half), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("pliers")
@@ -144,7 +144,7 @@ def pliers(*, length_m: float, spread: float, thick_m: float) -> Model:
     model.point("jaws", "tip", "jaws", (0.5 * length_m, 0.012 * length_m, 0.0), (1.0, 0.0, 0.0))
     return model.point(
         "handle", "surface", "handle", (-0.2 * length_m, half + 0.6 * thick_m, 0.0), (0.0, 1.0, 0.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("chisel")
@@ -167,7 +167,7 @@ def chisel(*, length_m: float, handle: float, width_m: float) -> Model:
     model.point("edge", "edge", "edge", (0.5 * length_m, 0.0, -0.5 * thick), (1.0, 0.0, 0.0))
     return model.point(
         "handle", "surface", "handle", (0.5 * (middle - 0.5 * length_m), 0.0, 0.0145), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("trowel")
@@ -190,7 +190,7 @@ def trowel(*, length_m: float, blade: float, width_m: float) -> Model:
     model.point("tip", "tip", "blade", (0.5 * length_m, 0.0, 0.001), (1.0, 0.0, 0.0))
     return model.point(
         "handle", "surface", "handle", (0.5 * (start - 0.04 - 0.5 * length_m), 0.0, 0.031), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("putty knife")
@@ -211,7 +211,7 @@ def putty_knife(*, length_m: float, blade: float, width_m: float) -> Model:
     model.point("edge", "edge", "blade", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0))
     return model.point(
         "handle", "surface", "handle", (0.5 * (start - 0.5 * length_m), 0.0, 0.0092), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("paint brush")
@@ -235,7 +235,7 @@ def paint_brush(*, length_m: float, width_m: float, bristles: float) -> Model:
     half = np.interp(share, [0, 0.2, 0.5, 0.85, 0.97, 1], [0.48 * width_m, 0.3 * width_m, 0.011, 0.015, 0.012, 0.006])
     model.add("handle", tube(np.stack([x, 0 * x, 0 * x], 1), half, flatten=0.36), "handle")
     model.point("bristles", "tip", "bristles", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("handle", "surface", "handle", (float(x[17]), 0.0, 0.0045), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (float(x[17]), 0.0, 0.0045), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("flashlight")
@@ -249,7 +249,9 @@ def flashlight(*, length_m: float, head: float, width_m: float) -> Model:
     model.add("lens", cylinder(0.86 * r, 0.001).rotate((0, 90, 0)).translate((0.5 * length_m - 0.0002, 0, 0)), "lens")
     model.add("switch", cylinder(0.0055, 0.004).translate((start - 0.035, 0, 0.6 * r)))
     model.point("lens", "face", "lens", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("switch", "button", "switch", (start - 0.035, 0.0, 0.6 * r + 0.004), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "switch", "button", "switch", (start - 0.035, 0.0, 0.6 * r + 0.004), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("axe")
@@ -278,4 +280,4 @@ def axe(*, length_m: float, head: float, thick_m: float) -> Model:
     )
     model.region("edge", "head", lambda centers: centers[:, 1] < -0.6 * across)
     model.point("edge", "edge", "edge", (at, -0.778 * across, 0.0), (0.0, -1.0, 0.0))
-    return model.point("handle", "surface", "handle", (-0.25 * length_m, 0.0, 0.0115), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (-0.25 * length_m, 0.0, 0.0115), (0.0, 0.0, 1.0)).rest_on_ground()

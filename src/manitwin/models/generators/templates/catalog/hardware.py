@@ -52,7 +52,9 @@ def clothespin(*, length_m: float, thick_m: float, open: float) -> Model:
     coil = cylinder(0.0042, thick_m + 0.002).translate((0.08 * end, 0, -0.5 * thick_m - 0.001))
     model.add("spring", coil, "spring")
     model.point("mouth", "tip", "legs", (end, 0.002, 0.0), (1.0, 0.0, 0.0))
-    return model.point("legs", "button", "legs", (-0.9 * end, open * length_m * 0.92, 0.0), (0.0, 1.0, 0.0)).laid()
+    return model.point(
+        "legs", "button", "legs", (-0.9 * end, open * length_m * 0.92, 0.0), (0.0, 1.0, 0.0)
+    ).rest_on_ground()
 
 
 @template("brick")
@@ -131,7 +133,7 @@ def dumbbell(*, length_m: float, width: float, grip_m: float) -> Model:
         cylinder(0.5 * grip_m, length_m - weight).rotate((0, 90, 0)).translate((-end + 0.5 * weight, 0, 0)),
         "handle",
     )
-    return model.point("handle", "surface", "handle", (0.0, 0.0, 0.5 * grip_m), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (0.0, 0.0, 0.5 * grip_m), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("padlock")
@@ -185,7 +187,7 @@ def curtain_ring(*, width_m: float, thick: float) -> Model:
     """Build a plain ring lying flat."""
     tube_m = thick * width_m
     model = Model().add("body", torus(0.5 * (width_m - tube_m), 0.5 * tube_m))
-    return model.point("hole", "hole", "body", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)).laid()
+    return model.point("hole", "hole", "body", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("coin")
@@ -224,7 +226,7 @@ def bolt(*, length_m: float, width: float, head: float, shank: float) -> Model:
     rod = lathe([*ridges, (0.7 * thin, length_m - high)]).rotate((0, 90, 0)).translate((high - 0.5 * length_m, 0, 0))
     model = Model().add("head", hexagon).add("thread", rod)
     model.point("head", "face", "head", (-0.5 * length_m, 0.0, 0.0), (-1.0, 0.0, 0.0))
-    return model.point("tip", "tip", "thread", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0)).laid()
+    return model.point("tip", "tip", "thread", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("washer")

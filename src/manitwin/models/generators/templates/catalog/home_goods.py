@@ -6,7 +6,7 @@ import numpy as np
 
 from manitwin.geometry.solids.shapes import chords, cylinder, lathe, polygon, prism, rectangle, rounded
 from manitwin.geometry.solids.sweep import arc, loft, tube
-from manitwin.models.generators.templates.catalog.organic import lying
+from manitwin.models.generators.templates.catalog.organic import lay_along_x
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -21,7 +21,7 @@ def light_switch(*, width_m: float, tall: float, deep: float, rocker: float) -> 
     lever = prism(polygon(side, radius_m=0.0006), b).translate((0, 0, -0.5 * b)).rotate((90, 0, 0))
     model.add("rocker", lever, "rocker")
     model.point("rocker", "button", "rocker", (-0.4 * a, 0.0, 1.4 * t), (0.4, 0.0, 0.917))
-    return model.laid()
+    return model.rest_on_ground()
 
 
 @template("wall socket")
@@ -33,7 +33,7 @@ def wall_socket(*, width_m: float, deep: float, well: float) -> Model:
     for side in (-1.0, 1.0):
         model.cut("contacts", cylinder(0.0025, t, sides=chords(20)).translate((0, side * 0.0095, 0.12 * t)), "contacts")
     model.point("contacts", "hole", "contacts", (0.0, 0.0, 0.35 * t), (0.0, 0.0, 1.0))
-    return model.laid()
+    return model.rest_on_ground()
 
 
 @template("lint roller")
@@ -41,7 +41,7 @@ def lint_roller(*, length_m: float, roll: float, width: float, grip: float) -> M
     """Build a lint roller: ``roll`` is the roll's share of the length, ``grip`` the handle's width relative to the roll's."""
     n, r = length_m, 0.5 * width * length_m
     start, thin = (0.5 - roll) * n, grip * r
-    model = Model().add("roller", lying(cylinder(r, roll * n).translate((0, 0, start))), "roller")
+    model = Model().add("roller", lay_along_x(cylinder(r, roll * n).translate((0, 0, start))), "roller")
     stick = [
         (0, -0.5 * n),
         (0.9 * thin, -0.5 * n),
@@ -52,10 +52,10 @@ def lint_roller(*, length_m: float, roll: float, width: float, grip: float) -> M
         (0.8 * r, start + 0.001),
         (0, start + 0.001),
     ]
-    model.add("handle", lying(lathe(rounded(stick, 0.4 * thin))), "")
-    model.cut("end", lying(cylinder(0.55 * r, 0.01).translate((0, 0, 0.5 * n - 0.006))), "")
+    model.add("handle", lay_along_x(lathe(rounded(stick, 0.4 * thin))), "")
+    model.cut("end", lay_along_x(cylinder(0.55 * r, 0.01).translate((0, 0, 0.5 * n - 0.006))), "")
     model.point("roller", "surface", "roller", ((0.5 - 0.5 * roll) * n, 0.0, r), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (-0.22 * n, 0.0, 0.8 * thin), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (-0.22 * n, 0.0, 0.8 * thin), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("hand broom")
@@ -103,4 +103,4 @@ def shoe_horn(*, length_m: float, width: float, grip: float, hollow: float) -> M
     model.region("blade", "body", lambda centers: centers[:, 0] > 0.12 * n)
     model.region("handle", "body", lambda centers: centers[:, 0] < -0.1 * n)
     model.point("blade", "edge", "blade", (0.5 * n, 0.0, 0.5 * t), (1.0, 0.0, 0.0))
-    return model.point("handle", "face", "handle", (-0.3 * n, 0.0, t), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "face", "handle", (-0.3 * n, 0.0, t), (0.0, 0.0, 1.0)).rest_on_ground()

@@ -151,7 +151,7 @@ def paper_towel(*, height_m: float, width: float, core_m: float) -> Model:
     return model.point("outside", "surface", "body", (-r, 0.0, 0.5 * height_m), (-1.0, 0.0, 0.0))
 
 
-def _oval(x_m: float, y_m: float) -> CrossSection:
+def _stadium(x_m: float, y_m: float) -> CrossSection:
     """Return a rectangle whose shorter sides are semicircles."""
     turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, chords(SIDES) // 2)
     right = np.stack([0.5 * (x_m - y_m) + 0.5 * y_m * np.cos(turn), 0.5 * y_m * np.sin(turn)], axis=1)
@@ -162,7 +162,7 @@ def _oval(x_m: float, y_m: float) -> CrossSection:
 def soap_dish(*, length_m: float, width: float, height: float, wall_m: float) -> Model:
     """Build an oval dish with ribs on its floor and drain holes."""
     across, high = width * length_m, height * length_m
-    outline, hollow = _oval(length_m, across), _oval(length_m - 2 * wall_m, across - 2 * wall_m)
+    outline, hollow = _stadium(length_m, across), _stadium(length_m - 2 * wall_m, across - 2 * wall_m)
     floor = 1.6 * wall_m
     model = Model().add("body", prism(outline, high, radius_m=0.25 * wall_m))
     model.cut("inside", prism(hollow, high).translate((0, 0, floor)))

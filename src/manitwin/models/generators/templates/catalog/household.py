@@ -84,7 +84,7 @@ def cleaning_brush(*, length_m: float, head_m: float, hair_m: float) -> Model:
     middle = path[16]
     return model.point(
         "handle", "surface", "handle", (float(middle[0]), 0.0, float(middle[2]) + 0.006), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("toilet paper")
@@ -138,7 +138,7 @@ def clothes_hanger(*, length_m: float, height: float, thick_m: float) -> Model:
         samples=40,
     )
     model.add("hook", tube(hook, 0.0018, across=(0, 0, 1), sides=10), "hook")
-    return model.point("hook", "surface", "hook", (0.0, y + 0.0738, 0.0), (0.0, 1.0, 0.0)).laid()
+    return model.point("hook", "surface", "hook", (0.0, y + 0.0738, 0.0), (0.0, 1.0, 0.0)).rest_on_ground()
 
 
 @template("plunger")
@@ -249,4 +249,4 @@ def funnel(*, height_m: float, width: float, spout: float, wall_m: float) -> Mod
 def tennis_ball(*, width_m: float) -> Model:
     """Build a ball."""
     model = Model().add("body", ellipsoid(width_m, width_m, width_m).translate((0, 0, 0.5 * width_m)))
-    return model.point("surface", "surface", "body", (0.0, 0.0, width_m), (0.0, 0.0, 1.0)).laid()
+    return model.point("surface", "surface", "body", (0.0, 0.0, width_m), (0.0, 0.0, 1.0)).rest_on_ground()

@@ -22,7 +22,7 @@ from manitwin.geometry.solids.sweep import arc, sweep
 from manitwin.models.generators.templates.template import Model, template
 
 
-def _lying(profile: list[Point], sides: int = 36) -> Manifold:
+def _lathe_along_x(profile: list[Point], sides: int = 36) -> Manifold:
     """Return a solid of revolution whose axis lies along X."""
     return lathe(profile, sides=sides).rotate((0, 90, 0))
 
@@ -35,10 +35,10 @@ def microphone(*, length_m: float, head_m: float, grip: float) -> Model:
     turn = np.linspace(-0.95, 0.5 * np.pi, 16)
     ball = [(float(r * np.cos(a)), float(end - r + r * np.sin(a))) for a in turn]
     grille = [(0.0, neck), (ball[0][0], neck), *ball, (0.0, end)]
-    model = Model().add("grille", _lying(grille), "grille")
+    model = Model().add("grille", _lathe_along_x(grille), "grille")
     model.add(
         "ring",
-        _lying([(0, end - 1.1 * r), (1.04 * r, end - 1.1 * r), (1.04 * r, end - 0.9 * r), (0, end - 0.9 * r)]),
+        _lathe_along_x([(0, end - 1.1 * r), (1.04 * r, end - 1.1 * r), (1.04 * r, end - 0.9 * r), (0, end - 0.9 * r)]),
         "ring",
     )
     shaft = [
@@ -48,14 +48,14 @@ def microphone(*, length_m: float, head_m: float, grip: float) -> Model:
         (1.15 * handle, neck - 0.004),
         (0, neck + 0.004),
     ]
-    model.add("body", _lying(rounded([*shaft[:-1], (0.8 * r, neck + 0.004), shaft[-1]], 0.004)))
+    model.add("body", _lathe_along_x(rounded([*shaft[:-1], (0.8 * r, neck + 0.004), shaft[-1]], 0.004)))
     at = neck - 0.28 * length_m
     switch = box(0.014, 0.007, 0.004, radius_m=0.001).translate((at, 0, 0.95 * handle - 0.0015))
     model.add("switch", switch, "ring")
     model.cut("connector", cylinder(0.55 * handle, 0.014).rotate((0, 90, 0)).translate((-end - 0.001, 0, 0)), "ring")
     model.point("grille", "tip", "grille", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     model.point("switch", "button", "switch", (at, 0.0, 0.95 * handle + 0.0025), (0.0, 0.0, 1.0))
-    return model.point("body", "surface", "body", (-0.4 * end, 0.0, 0.84 * handle), (0.0, 0.0, 1.0)).laid()
+    return model.point("body", "surface", "body", (-0.4 * end, 0.0, 0.84 * handle), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("multimeter")
@@ -102,7 +102,7 @@ def thermometer(*, length_m: float, width: float, thick_m: float) -> Model:
     )  # fmt: skip
     model = Model().add("body", prism(outline, thick_m, radius_m=0.25 * thick_m))
     probe = rounded([(0, 0.5 * end), (0.0019, 0.5 * end), (0.0019, end), (0, end)], 0.0018)
-    model.add("probe", _lying(probe, sides=20).translate((0, 0, 0.5 * thick_m)), "probe")
+    model.add("probe", _lathe_along_x(probe, sides=20).translate((0, 0, 0.5 * thick_m)), "probe")
     window = box(0.36 * end, 1.1 * half, 0.002).translate((-0.12 * end, 0, thick_m - 0.0014))
     model.add("screen", window, "screen")
     model.add("button", cylinder(0.5 * half, 0.003, sides=24).translate((-0.7 * end, 0, thick_m - 0.0016)), "button")
@@ -119,11 +119,13 @@ def syringe(*, length_m: float, width: float, drawn: float, needle_m: float) -> 
     front = end - needle_m - 0.01
     back = front - barrel
     profile = [(0, back), (r, back), (r, front - 0.003), (0.0028, front), (0.002, front + 0.01), (0, front + 0.01)]
-    model = Model().add("barrel", _lying(rounded(profile, 0.001)))
+    model = Model().add("barrel", _lathe_along_x(rounded(profile, 0.001)))
     model.add("flange", box(0.0022, 4.2 * r, 2.0 * r, radius_m=0.001).translate((back + 0.001, 0, -r)))
-    rod = _lying([(0, -end + 0.001), (0.5 * r, -end + 0.001), (0.5 * r, back + 0.004), (0, back + 0.004)])
+    rod = _lathe_along_x([(0, -end + 0.001), (0.5 * r, -end + 0.001), (0.5 * r, back + 0.004), (0, back + 0.004)])
     model.add("plunger", rod, "plunger")
-    model.add("plunger", _lying([(0, -end), (1.15 * r, -end), (1.15 * r, -end + 0.002), (0, -end + 0.002)]), "plunger")
+    model.add(
+        "plunger", _lathe_along_x([(0, -end), (1.15 * r, -end), (1.15 * r, -end + 0.002), (0, -end + 0.002)]), "plunger"
+    )
     model.add(
         "needle",
         cylinder(0.0008, needle_m + 0.006, top_radius_m=0.0005, sides=12)
@@ -133,7 +135,7 @@ def syringe(*, length_m: float, width: float, drawn: float, needle_m: float) -> 
     )
     model.point("tip", "tip", "needle", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     model.point("plunger", "button", "plunger", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0))
-    return model.point("barrel", "surface", "barrel", (0.5 * (front + back), 0.0, r), (0.0, 0.0, 1.0)).laid()
+    return model.point("barrel", "surface", "barrel", (0.5 * (front + back), 0.0, r), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("tweezers")
@@ -156,7 +158,9 @@ def tweezers(*, length_m: float, spread: float, width_m: float) -> Model:
     model.region("tips", "arms", lambda centers: centers[:, 0] > 0.8 * end)
     model.region("joint", "arms", lambda centers: centers[:, 0] < -0.86 * end)
     model.point("tips", "tip", "tips", (end, 0.3 * open_m, 0.0), (1.0, 0.0, 0.0))
-    return model.point("arms", "surface", "arms", (0.1 * end, open_m + 0.11 * width_m, 0.0), (0.0, 1.0, 0.0)).laid()
+    return model.point(
+        "arms", "surface", "arms", (0.1 * end, open_m + 0.11 * width_m, 0.0), (0.0, 1.0, 0.0)
+    ).rest_on_ground()
 
 
 @template("test tube")
@@ -169,12 +173,12 @@ def test_tube(*, length_m: float, width: float, wall_m: float) -> Model:
         bottom = [(float(radius * np.cos(a)), float(start + radius + radius * np.sin(a))) for a in turn]
         return [*bottom, (radius, stop), (0.0, stop)]
 
-    model = Model().add("body", _lying(capsule(r, -end, end)))
-    lip = _lying(rounded([(0, end - 0.004), (1.14 * r, end - 0.004), (1.14 * r, end), (0, end)], 0.0015))
-    model.add("rim", lip).cut("inside", _lying(capsule(r - wall_m, -end + wall_m, end + 0.01)))
+    model = Model().add("body", _lathe_along_x(capsule(r, -end, end)))
+    lip = _lathe_along_x(rounded([(0, end - 0.004), (1.14 * r, end - 0.004), (1.14 * r, end), (0, end)], 0.0015))
+    model.add("rim", lip).cut("inside", _lathe_along_x(capsule(r - wall_m, -end + wall_m, end + 0.01)))
     model.region("bottom", "body", lambda centers: centers[:, 0] < -end + r)
     model.point("opening", "opening", "rim", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("body", "surface", "body", (-0.1 * end, 0.0, r), (0.0, 0.0, 1.0)).laid()
+    return model.point("body", "surface", "body", (-0.1 * end, 0.0, r), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("alarm clock")
@@ -246,4 +250,4 @@ def alarm_clock(*, height_m: float, width: float, depth: float, bell: float) -> 
     model.point("dial", "face", "dial", (0.0, front, middle - 0.3 * r), (0.0, -1.0, 0.0))
     model.point("knob", "button", "knob", (0.0, 0.59 * deep, middle), (0.0, 1.0, 0.0))
     top = middle + 1.44 * r
-    return model.point("hammer", "surface", "hammer", (0.0, 0.0, top), (0.0, 0.0, 1.0)).laid()
+    return model.point("hammer", "surface", "hammer", (0.0, 0.0, top), (0.0, 0.0, 1.0)).rest_on_ground()

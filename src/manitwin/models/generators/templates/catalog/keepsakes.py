@@ -51,7 +51,7 @@ def christmas_ornament(*, width_m: float, tall: float, cap: float, band: float) 
     model.add("hanger", loop, "cap")
     end = start + long + 0.76 * wide
     model.point("hanger", "tip", "hanger", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("body", "surface", "body", (-0.3 * half, 0.0, 0.953 * r), (0.0, 0.0, 1.0)).laid()
+    return model.point("body", "surface", "body", (-0.3 * half, 0.0, 0.953 * r), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("trophy")
@@ -112,7 +112,7 @@ def medal(*, width_m: float, thick: float, rim: float, ring: float) -> Model:
     model.add("ring", eye, "ring")
     model.point("ring", "hole", "ring", (r + 0.75 * bore, 0.0, 0.5 * t), (0.0, 0.0, 1.0))
     model.point("front", "face", "star", (0.0, 0.0, 1.05 * t), (0.0, 0.0, 1.0))
-    return model.laid()
+    return model.rest_on_ground()
 
 
 @template("jewelry box")
@@ -132,7 +132,7 @@ def jewelry_box(*, length_m: float, width: float, height: float, lid: float) -> 
             model.add("feet", foot.translate((side * 0.42 * x, across * (0.5 * y - 0.07 * x), -0.0025)), "latch")
     model.point("lid", "face", "lid", (0.0, 0.0, h), (0.0, 0.0, 1.0))
     model.point("front", "surface", "latch", (0.0, -0.5 * y - 0.0028, split), (0.0, -1.0, 0.0))
-    return model.laid()
+    return model.rest_on_ground()
 
 
 @template("tool box")

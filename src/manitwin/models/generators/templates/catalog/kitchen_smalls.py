@@ -9,7 +9,7 @@ from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import chords, cylinder, ellipsoid, lathe, polygon, prism, rectangle, rounded
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.organic import lying
+from manitwin.models.generators.templates.catalog.organic import lay_along_x
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -33,7 +33,7 @@ def measuring_spoon(*, length_m: float, bowl: float, deep: float, grip: float) -
     hole = cylinder(0.26 * grip * n, 1.0, sides=chords(24)).translate((-0.5 * n + 0.5 * grip * n, 0, -0.5))
     model.cut("hole", hole, "")
     model.point("bowl", "opening", "inside", (at, 0.0, high), (0.0, 0.0, 1.0))
-    return model.point("handle", "face", "handle", (-0.25 * n, 0.0, high), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "face", "handle", (-0.25 * n, 0.0, high), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("basting brush")
@@ -61,7 +61,7 @@ def basting_brush(*, length_m: float, head: float, width: float, ferrule: float)
     hole = cylinder(0.09 * y, 1.0, sides=chords(20)).translate((-0.44 * n, 0, -0.5))
     model.cut("hole", hole, "")
     model.point("bristles", "edge", "bristles", (0.5 * n, 0.0, 0.5 * thick), (1.0, 0.0, 0.0))
-    return model.point("handle", "face", "handle", (-0.25 * n, 0.0, thick), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "face", "handle", (-0.25 * n, 0.0, thick), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("corkscrew")
@@ -88,7 +88,7 @@ def corkscrew(*, length_m: float, handle: float, coil: float, turns: float) -> M
     start = -0.02 * n
     model.add(
         "shank",
-        lying(cylinder(1.25 * wire, 0.5 * n - thick + start + wire, sides=chords(20))).translate(
+        lay_along_x(cylinder(1.25 * wire, 0.5 * n - thick + start + wire, sides=chords(20))).translate(
             (-0.5 * n + thick, 0, 0)
         ),
         "worm",
@@ -101,7 +101,7 @@ def corkscrew(*, length_m: float, handle: float, coil: float, turns: float) -> M
     model.add("worm", tube(path, radii, sides=chords(12)), "worm")
     end = tuple(float(v) for v in path[-1])
     model.point("worm", "tip", "worm", (end[0], end[1], end[2]), (1.0, 0.0, 0.0))
-    return model.point("handle", "surface", "handle", (-0.5 * n, 0.25 * bar, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("handle", "surface", "handle", (-0.5 * n, 0.25 * bar, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("egg carton")
@@ -134,7 +134,7 @@ def egg_carton(*, length_m: float, width: float, height: float, cups: float) -> 
     model.point("flap", "surface", "flap", (0.0, -0.5 * y - 0.004, seam), (0.0, -1.0, 0.0))
     return model.point(
         "base", "surface", "body", (0.5 * px if count % 2 == 0 else 0.0, 0.5 * py, 0.0), (0.0, 0.0, -1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("coffee pot")
@@ -183,7 +183,7 @@ def moka_pot(*, height_m: float, width: float, waist: float, handle: float) -> M
 def drinking_straw(*, length_m: float, width: float, bore: float) -> Model:
     """Build a lying straight straw."""
     n, r = length_m, 0.5 * width * length_m
-    model = Model().add("body", lying(cylinder(r, n, sides=chords(28)).translate((0, 0, -0.5 * n))))
-    model.cut("bore", lying(cylinder(bore * r, 2 * n, sides=chords(28)).translate((0, 0, -n))), "")
+    model = Model().add("body", lay_along_x(cylinder(r, n, sides=chords(28)).translate((0, 0, -0.5 * n))))
+    model.cut("bore", lay_along_x(cylinder(bore * r, 2 * n, sides=chords(28)).translate((0, 0, -n))), "")
     model.point("end", "hole", "bore", (0.5 * n, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("middle", "surface", "body", (0.0, 0.0, r), (0.0, 0.0, 1.0)).laid()
+    return model.point("middle", "surface", "body", (0.0, 0.0, r), (0.0, 0.0, 1.0)).rest_on_ground()

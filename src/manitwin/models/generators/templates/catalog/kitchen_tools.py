@@ -39,7 +39,7 @@ def tongs(*, length_m: float, spread: float, width_m: float, head: float) -> Mod
     model.point("joint", "surface", "joint", (tail + 0.012, 0.0, 0.5 * width_m), (0.0, 0.0, 1.0))
     return model.point(
         "handles", "surface", "handle", (0.25 * tail, 0.8 * half, 0.45 * width_m), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 def _loop(x_m: float, y_m: float, at_m: float) -> np.ndarray:
@@ -79,7 +79,7 @@ def peeler(*, length_m: float, blade: float, width_m: float) -> Model:
     model.point("blade", "edge", "edge", (start + 0.47 * long, 0.25 * r, 0.96 * r), (0.0, 0.0, 1.0))
     return model.point(
         "handle", "surface", "handle", (0.5 * (start - 0.008 - end), 0.0, 0.58 * width_m), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("bottle opener")
@@ -106,7 +106,7 @@ def bottle_opener(*, length_m: float, head: float, thick_m: float) -> Model:
     model.cut("mouth", prism(mouth - lip, 3 * thick_m).translate((0, 0, -thick_m)), "body")
     model.cut("hole", cylinder(0.0032, 3 * thick_m).translate((-end + 0.012, 0, -thick_m)), "body")
     model.point("mouth", "hole", "mouth", (at + 0.1 * wide, 0.0, 0.5 * thick_m), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (-0.45 * end, 0.0, thick_m), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (-0.45 * end, 0.0, thick_m), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("can opener")
@@ -167,7 +167,9 @@ def can_opener(*, length_m: float, spread: float, wheel_m: float) -> Model:
     model.add("key", wings.rotate((0, 0, 90)).translate((at, 0, top)), "key")
     model.point("cutting head", "surface", "wheel", (at + 0.045 * length_m, -0.004, -thick - 0.006), (0.0, 0.0, -1.0))
     model.point("key", "surface", "key", (at, 0.0, top + 0.008), (0.0, 0.0, 1.0))
-    return model.point("handles", "surface", "handle", (-0.5 * end, half + 0.0095, 0.0), (0.0, 1.0, 0.0)).laid()
+    return model.point(
+        "handles", "surface", "handle", (-0.5 * end, half + 0.0095, 0.0), (0.0, 1.0, 0.0)
+    ).rest_on_ground()
 
 
 @template("pizza cutter")
@@ -191,7 +193,9 @@ def pizza_cutter(*, length_m: float, wheel: float, grip_m: float) -> Model:
     model.add("guard", ellipsoid(0.014, 2.3 * grip_m, 0.9 * grip_m).translate((start - 0.012, 0, 0)), "handle")
     model.add("handle", grip(-end, start - 0.008, 0.5 * grip_m, flatten=0.85, swell=0.15), "handle")
     model.point("front edge", "edge", "edge", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("handle", "surface", "handle", (0.5 * (start - end), 0.0, 0.48 * grip_m), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (0.5 * (start - end), 0.0, 0.48 * grip_m), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("ice cream scoop")
@@ -211,7 +215,7 @@ def ice_cream_scoop(*, length_m: float, bowl_m: float, deep: float) -> Model:
     model.point("bowl tip", "tip", "bowl", (end, 0.0, -0.0005), (1.0, 0.0, 0.0))
     return model.point(
         "handle", "surface", "handle", (0.5 * (start - 0.02 - end), 0.0, 0.0128 - 0.05 * low), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("masher")
@@ -245,7 +249,9 @@ def masher(*, length_m: float, plate_m: float, head: float) -> Model:
     ahead = (float(np.cos(angle)), 0.0, float(np.sin(angle)))
     model.point("plate", "face", "head", (end * ahead[0], 0.0, end * ahead[2]), ahead)
     place = (middle * ahead[0] - 0.0135 * ahead[2], 0.0, middle * ahead[2] + 0.0135 * ahead[0])
-    return model.point("handle", "surface", "handle", (float(place[0]), 0.0, float(place[2])), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (float(place[0]), 0.0, float(place[2])), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("pestle")
@@ -265,7 +271,9 @@ def pestle(*, length_m: float, head_m: float, waist: float) -> Model:
     model = Model().add("shaft", lathe(profile).rotate((0, 90, 0)))
     model.region("tip", "shaft", lambda centers: centers[:, 0] > end - 0.7 * r)
     model.point("grinding end", "tip", "tip", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("shaft", "surface", "shaft", (-0.15 * length_m, 0.0, waist * r), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "shaft", "surface", "shaft", (-0.15 * length_m, 0.0, waist * r), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("honey dipper")
@@ -283,4 +291,4 @@ def honey_dipper(*, length_m: float, head: float, width_m: float) -> Model:
     model = Model().add("shaft", lathe(profile).rotate((0, 90, 0)))
     model.region("head", "shaft", lambda centers: centers[:, 0] > start)
     model.point("head", "surface", "head", (start + 0.5 * long, 0.0, r), (0.0, 0.0, 1.0))
-    return model.point("shaft", "surface", "shaft", (-0.5 * end, 0.0, 0.004), (0.0, 0.0, 1.0)).laid()
+    return model.point("shaft", "surface", "shaft", (-0.5 * end, 0.0, 0.004), (0.0, 0.0, 1.0)).rest_on_ground()

@@ -13,7 +13,7 @@ from manitwin.geometry.solids.sweep import arc, tube
 Radii = Callable[[np.ndarray], np.ndarray]
 
 
-def turned(
+def smooth_revolution(
     profile: Sequence[Point], width_m: float, height_m: float, *, samples: int = 36, sides: int = SIDES
 ) -> Manifold:
     """Return the body of revolution about Z of a smooth curve through points.
@@ -24,12 +24,12 @@ def turned(
     return lathe(curve[:, [0, 2]], sides=chords(sides))
 
 
-def lying(solid: Manifold) -> Manifold:
+def lay_along_x(solid: Manifold) -> Manifold:
     """Return a solid rotated so that its axis Z lies along +X."""
     return solid.rotate((0, 90, 0))
 
 
-def ribbed(solid: Manifold, scale: Radii) -> Manifold:
+def scale_radially(solid: Manifold, scale: Radii) -> Manifold:
     """Return a solid whose distances from the axis Z are scaled by a function of the azimuth ``(N,)`` in rad."""
 
     def moved(vertices: np.ndarray) -> np.ndarray:
@@ -40,7 +40,7 @@ def ribbed(solid: Manifold, scale: Radii) -> Manifold:
 
 
 def furrow(depth: float, half_width_rad: float, toward_rad: float) -> Radii:
-    """Return a scale function for ``ribbed``: a furrow of ``depth`` (in radii) along the side at azimuth ``toward_rad``."""
+    """Return a scale function for ``scale_radially``: a furrow of ``depth`` (in radii) along the azimuth ``toward_rad``."""
 
     def scale(angle: np.ndarray) -> np.ndarray:
         off = np.abs(np.angle(np.exp(1j * (angle - toward_rad))))

@@ -198,7 +198,7 @@ def playing_cards(*, length_m: float, width: float, thick: float) -> Model:
     emblem = prism(polygon([(-x, 0), (0, -y), (x, 0), (0, y)]), 0.0004)
     model.add("emblem", emblem.translate((0, 0, high + 0.0002)), "emblem")
     model.point("flap", "surface", "flap", (0.5 * length_m, 0.0, 0.5 * high), (1.0, 0.0, 0.0))
-    return model.point("front", "face", "back", (-0.3 * length_m, 0.0, high + 0.0003), (0.0, 0.0, 1.0)).laid()
+    return model.point("front", "face", "back", (-0.3 * length_m, 0.0, high + 0.0003), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("glasses case")

@@ -6,7 +6,7 @@ import numpy as np
 
 from manitwin.geometry.solids.shapes import box, cylinder, lathe, polygon, prism, rectangle, rounded
 from manitwin.models.generators.templates.catalog.bottles import capped
-from manitwin.models.generators.templates.catalog.vessel import hollowed
+from manitwin.models.generators.templates.catalog.vessel import assemble_from_profile
 from manitwin.models.generators.templates.template import Model, template
 
 BEAD_M = 0.0018
@@ -188,4 +188,4 @@ def conical_flask(*, height_m: float, width: float, neck: float, slope: float, w
     h, r = height_m, 0.5 * width * height_m
     n = max(neck * r, 0.009)
     profile = rounded([(0.93 * r, 0.0), (r, 0.05 * h), (n, slope * h), (n, 0.97 * h), (1.16 * n, h)], 0.02 * h)
-    return hollowed(Model(), profile, wall_m, 1.2 * wall_m)
+    return assemble_from_profile(Model(), profile, wall_m, 1.2 * wall_m)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from manitwin.geometry.solids.shapes import lathe, polygon, prism, rectangle, rounded
-from manitwin.models.generators.templates.catalog.vessel import bulge
+from manitwin.models.generators.templates.catalog.vessel import smooth_profile
 from manitwin.models.generators.templates.template import Model, template
 
 LEAST_NECK_M = 0.009
@@ -20,7 +20,7 @@ def ketchup_bottle(
     """
     h, r = height_m, 0.5 * width * height_m
     top, n = (1 - cap) * h, max(neck * r, LEAST_NECK_M)
-    side = bulge([(0.98 * r, 0.07 * top), (waist * r, 0.4 * top), (r, shoulder * top), (0.98 * n, top)])
+    side = smooth_profile([(0.98 * r, 0.07 * top), (waist * r, 0.4 * top), (r, shoulder * top), (0.98 * n, top)])
     body = lathe([(0.0, 0.0), *rounded([(0.88 * r, 0.0), (0.95 * r, 0.02 * top), side[0]], 0.01), *side, (0.0, top)])
     high = h - top
     spout = [(0.52 * n, top + 0.5 * high), (max(0.36 * n, 0.004), h), (0.0, h)]

@@ -17,9 +17,9 @@ from manitwin.geometry.solids.shapes import (
     rounded,
     torus,
 )
-from manitwin.models.generators.templates.catalog.organic import lying
+from manitwin.models.generators.templates.catalog.organic import lay_along_x
 from manitwin.models.generators.templates.catalog.toy_vehicles import slab_across
-from manitwin.models.generators.templates.catalog.vessel import hollowed
+from manitwin.models.generators.templates.catalog.vessel import assemble_from_profile
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -31,7 +31,7 @@ def stacking_cup(*, height_m: float, width: float, taper: float, wall_m: float, 
     profile = rounded(
         [(0.94 * taper * r, 0.0), (taper * r, 0.04 * h), (0.92 * r, edge), (r, edge + 0.001), (r, h)], 0.003
     )
-    return hollowed(Model(), profile, max(wall_m, 0.0015), wall_m)
+    return assemble_from_profile(Model(), profile, max(wall_m, 0.0015), wall_m)
 
 
 @template("mahjong tile")
@@ -103,7 +103,7 @@ def fidget_spinner(*, width_m: float, thick: float, lobe: float, hub: float) -> 
     )
     return model.point(
         "lobe", "surface", "body", (end[0], end[1], 0.5 * t), (float(np.cos(angles[1])), float(np.sin(angles[1])), 0.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("whistle")
@@ -126,7 +126,7 @@ def whistle(*, length_m: float, drum: float, width: float, bore: float) -> Model
     ring = torus(0.3 * r, 0.0011, sides=chords(32)).rotate((90, 0, 0)).translate((-0.5 * n - 0.24 * r, 0, 0))
     model.add("ring", ring, "ring")
     model.point("mouthpiece", "hole", "mouth", (0.5 * n, 0.0, 0.78 * r), (1.0, 0.0, 0.0))
-    return model.point("body", "surface", "body", (r - 0.5 * n, -0.5 * y, 0.0), (0.0, -1.0, 0.0)).laid()
+    return model.point("body", "surface", "body", (r - 0.5 * n, -0.5 * y, 0.0), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("baton")
@@ -135,20 +135,22 @@ def wand(*, length_m: float, width: float, tip: float, grip: float) -> Model:
     """Build a lying stick with ends of another colour; ``tip`` and ``grip`` are their shares of the length."""
     n, r = length_m, 0.5 * width * length_m
     model = Model().add(
-        "body", lying(cylinder(0.92 * r, n - 0.002, sides=chords(32)).translate((0, 0, -0.5 * n + 0.001)))
+        "body", lay_along_x(cylinder(0.92 * r, n - 0.002, sides=chords(32)).translate((0, 0, -0.5 * n + 0.001)))
     )
     model.add(
         "tip",
-        lying(lathe(rounded([(0, (0.5 - tip) * n), (r, (0.5 - tip) * n), (r, 0.5 * n), (0, 0.5 * n)], 0.4 * r))),
+        lay_along_x(lathe(rounded([(0, (0.5 - tip) * n), (r, (0.5 - tip) * n), (r, 0.5 * n), (0, 0.5 * n)], 0.4 * r))),
         "ends",
     )
     model.add(
         "grip",
-        lying(lathe(rounded([(0, -0.5 * n), (r, -0.5 * n), (r, (grip - 0.5) * n), (0, (grip - 0.5) * n)], 0.4 * r))),
+        lay_along_x(
+            lathe(rounded([(0, -0.5 * n), (r, -0.5 * n), (r, (grip - 0.5) * n), (0, (grip - 0.5) * n)], 0.4 * r))
+        ),
         "ends",
     )
     model.point("tip", "tip", "tip", (0.5 * n, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("grip", "surface", "grip", ((0.5 * grip - 0.5) * n, 0.0, r), (0.0, 0.0, 1.0)).laid()
+    return model.point("grip", "surface", "grip", ((0.5 * grip - 0.5) * n, 0.0, r), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("squash ball")
@@ -181,7 +183,7 @@ def harmonica(*, length_m: float, deep: float, height: float, holes: float) -> M
         )
         model.cut("holes", hole, "holes")
     model.point("holes", "face", "holes", (0.0, -0.48 * y, 0.5 * h), (0.0, -1.0, 0.0))
-    return model.point("cover", "face", "covers", (0.0, 0.3 * y, h), (0.0, 0.0, 1.0)).laid()
+    return model.point("cover", "face", "covers", (0.0, 0.3 * y, h), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("flute")
@@ -203,7 +205,7 @@ def recorder(*, length_m: float, width: float, beak: float, foot: float) -> Mode
         (0.94 * r, 0.5 * n),
         (0, 0.5 * n),
     ]
-    model = Model().add("body", lying(lathe(rounded(side, 0.3 * r))))
+    model = Model().add("body", lay_along_x(lathe(rounded(side, 0.3 * r))))
     slope = prism(polygon([(0.34 * n, -1.2 * r), (0.56 * n, 0.2 * r), (0.56 * n, -2 * r), (0.34 * n, -2 * r)]), 4 * r)
     model.cut("beak", slope.translate((0, 0, -2 * r)).rotate((90, 0, 0)), "")
     window = box(0.05 * n, 0.8 * r, r).translate((neck + 0.09 * n, 0, 0.62 * r))
@@ -214,6 +216,6 @@ def recorder(*, length_m: float, width: float, beak: float, foot: float) -> Mode
             cylinder(0.24 * r, r, sides=chords(16)).translate((neck - (0.1 + 0.075 * number) * n, 0, 0.45 * r)),
             "",
         )
-    model.cut("bore", lying(cylinder(0.5 * r, 0.1 * n, sides=chords(24)).translate((0, 0, -0.52 * n))), "")
+    model.cut("bore", lay_along_x(cylinder(0.5 * r, 0.1 * n, sides=chords(24)).translate((0, 0, -0.52 * n))), "")
     model.point("mouthpiece", "tip", "body", (0.5 * n, 0.0, 0.4 * r), (1.0, 0.0, 0.0))
-    return model.point("shaft", "surface", "body", (-0.1 * n, -0.86 * r, 0.0), (0.0, -1.0, 0.0)).laid()
+    return model.point("shaft", "surface", "body", (-0.1 * n, -0.86 * r, 0.0), (0.0, -1.0, 0.0)).rest_on_ground()

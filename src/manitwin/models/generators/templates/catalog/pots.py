@@ -6,7 +6,7 @@ import numpy as np
 
 from manitwin.geometry.solids.shapes import cylinder, lathe, rounded
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.vessel import ear, hollowed, shell, stick
+from manitwin.models.generators.templates.catalog.vessel import assemble_from_profile, ear, shell, stick
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -16,7 +16,7 @@ def frying_pan(*, width_m: float, height: float, wall_m: float, handle: float) -
     model, radius, high = Model(), 0.5 * width_m, height * width_m
     profile = rounded([(0.78 * radius, 0.0), (0.8 * radius, 0.002), (radius, high)], 0.01)
     grip = stick(model, radius, 0.8 * high, handle * width_m, 0.45 * high, 0.0125)
-    return hollowed(model, profile, wall_m, 1.3 * wall_m, grip)
+    return assemble_from_profile(model, profile, wall_m, 1.3 * wall_m, grip)
 
 
 @template("saucepan")
@@ -25,7 +25,7 @@ def saucepan(*, width_m: float, height: float, wall_m: float, handle: float) -> 
     model, radius, high = Model(), 0.5 * width_m, height * width_m
     profile = rounded([(0.94 * radius, 0.0), (0.97 * radius, 0.003), (radius, high)], 0.008)
     grip = stick(model, radius, 0.82 * high, handle * width_m, 0.1 * high, 0.0115)
-    return hollowed(model, profile, wall_m, 2 * wall_m, grip)
+    return assemble_from_profile(model, profile, wall_m, 2 * wall_m, grip)
 
 
 @template("wok")
@@ -37,7 +37,7 @@ def wok(*, width_m: float, height: float, wall_m: float, handle: float) -> Model
     side_list = [(float(r), float(z)) for r, z in side]
     foot = side_list[0][1]
     profile = [(side_list[0][0], 0.0), *((r, (z - foot) * high / (high - foot)) for r, z in side_list[1:])]
-    return hollowed(
+    return assemble_from_profile(
         model, profile, wall_m, 1.5 * wall_m, stick(model, radius, 0.85 * high, handle * width_m, 0.35 * high, 0.013)
     )
 
@@ -61,7 +61,7 @@ def pot(*, width_m: float, height: float, wall_m: float, ears: float) -> Model:
         handles.append(("handle", tube(path, 0.006, across=(0, 0, 1))))
         model.point("handle", "surface", "handle", (side * out, 0.0, 0.83 * high), (side, 0.0, 0.0))
     profile = rounded([(0.95 * radius, 0.0), (radius, 0.006), (radius, high)], 0.008)
-    return hollowed(model, profile, wall_m, 2 * wall_m, *handles)
+    return assemble_from_profile(model, profile, wall_m, 2 * wall_m, *handles)
 
 
 @template("pot lid")
@@ -107,7 +107,7 @@ def bucket(*, height_m: float, width: float, taper: float, wall_m: float) -> Mod
         samples=40,
     )
     model.point("handle", "surface", "handle", (0.0, 0.0, 1.55 * height_m + 0.004), (0.0, 0.0, 1.0))
-    return hollowed(model, profile, wall_m, 1.5 * wall_m, ("handle", tube(path, 0.004)))
+    return assemble_from_profile(model, profile, wall_m, 1.5 * wall_m, ("handle", tube(path, 0.004)))
 
 
 @template("flower pot")
@@ -116,7 +116,7 @@ def flower_pot(*, height_m: float, width: float, taper: float, wall_m: float) ->
     h, r = height_m, 0.5 * width * height_m
     slope = (1 - taper) * r / h
     profile = [(taper * r, 0.0), (taper * r + 0.78 * h * slope - 0.0, 0.78 * h), (r, 0.8 * h), (r * 1.01, h)]
-    model = hollowed(Model(), profile, wall_m, 1.4 * wall_m)
+    model = assemble_from_profile(Model(), profile, wall_m, 1.4 * wall_m)
     return model.cut("hole", cylinder(0.12 * r, 4 * wall_m).translate((0, 0, -wall_m)))
 
 
@@ -125,7 +125,7 @@ def trash_can(*, height_m: float, width: float, taper: float, wall_m: float) -> 
     """Build an open waste bin."""
     radius = 0.5 * width * height_m
     profile = rounded([(0.95 * taper * radius, 0.0), (taper * radius, 0.01), (radius, height_m)], 0.006)
-    return hollowed(Model(), profile, wall_m, 1.5 * wall_m)
+    return assemble_from_profile(Model(), profile, wall_m, 1.5 * wall_m)
 
 
 @template("pen holder")
@@ -133,7 +133,7 @@ def pen_holder(*, height_m: float, width: float, wall_m: float, taper: float) ->
     """Build a cup for pens."""
     radius = 0.5 * width * height_m
     profile = rounded([(0.97 * taper * radius, 0.0), (taper * radius, 0.002), (radius, height_m)], 0.003)
-    return hollowed(Model(), profile, wall_m, 1.5 * wall_m)
+    return assemble_from_profile(Model(), profile, wall_m, 1.5 * wall_m)
 
 
 @template("candle holder")
@@ -171,7 +171,7 @@ def vase(*, height_m: float, width: float, neck: float, mouth: float, wall_m: fl
     radii = np.interp(levels, [0, 0.12, 0.38, 0.6, 0.8, 0.9, 1], [0.6, 0.78, 1.0, 0.8, neck, neck * 1.05, mouth])
     smooth = np.convolve(np.pad(radii, 2, mode="edge"), np.ones(5) / 5, mode="valid")
     profile = [(float(r * share), float(h * level)) for share, level in zip(smooth, levels, strict=True)]
-    return hollowed(Model(), profile, wall_m, 1.6 * wall_m)
+    return assemble_from_profile(Model(), profile, wall_m, 1.6 * wall_m)
 
 
 @template("watering can")

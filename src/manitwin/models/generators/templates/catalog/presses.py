@@ -102,4 +102,4 @@ def garlic_press(*, length_m: float, spread: float, chamber_m: float) -> Model:
     model.point("holes", "face", "chamber", (at, 0.85 * r - 0.0015, 0.0), (0.0, 0.0, -1.0))
     model.point("chamber", "surface", "chamber", (at, -0.85 * r, 0.5 * deep), (0.0, -1.0, 0.0))
     place = (float(grip[0]), 0.0, float(grip[2]) + 0.0046)
-    return model.point("handles", "surface", "handle", place, (0.0, 0.0, 1.0)).laid()
+    return model.point("handles", "surface", "handle", place, (0.0, 0.0, 1.0)).rest_on_ground()

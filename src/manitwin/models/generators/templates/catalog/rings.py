@@ -12,9 +12,9 @@ def ring_radii(width_m: float, hole: float) -> tuple[float, float]:
     return 0.25 * width_m * (1 + hole), 0.25 * width_m * (1 - hole)
 
 
-def with_both_sides(model: Model, width_m: float, hole: float, *, hole_share: float) -> Model:
+def finish_ring(model: Model, width_m: float, hole: float, *, hole_share: float) -> Model:
     """Name the inner wall of a ring about Z (``hole_share`` of half its band), add grasp points at its sides, and lay it down."""
     ring, half = ring_radii(width_m, hole)
     model.region("hole", "body", lambda c: np.hypot(c[:, 0], c[:, 1]) < ring - (1 - hole_share) * half)
     model.point("inner side", "hole", "hole", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    return model.point("outer side", "surface", "body", (0.0, -0.5 * width_m, 0.0), (0.0, -1.0, 0.0)).laid()
+    return model.point("outer side", "surface", "body", (0.0, -0.5 * width_m, 0.0), (0.0, -1.0, 0.0)).rest_on_ground()

@@ -7,7 +7,7 @@ from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import chords, cylinder, ellipsoid, union
 from manitwin.geometry.solids.sweep import tube
-from manitwin.models.generators.templates.catalog.organic import lying, ribbed, stalk, turned
+from manitwin.models.generators.templates.catalog.organic import lay_along_x, scale_radially, smooth_revolution, stalk
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -19,8 +19,8 @@ def garlic(*, width_m: float, tall: float, cloves: float, neck: float) -> Model:
     """
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.0), (0.22, 0.0), (0.5, 0.025), (0.86, 0.16), (1, 0.36), (0.9, 0.58), (0.62, 0.76), (0.34, 0.9)]
-    body = turned([*profile, (0.2, 1.0), (0, 1.0)], width_m, h, sides=120)
-    parted = ribbed(body, lambda angle: 1 - cloves * (1 - np.abs(np.sin(4.5 * angle)) ** 0.7))
+    body = smooth_revolution([*profile, (0.2, 1.0), (0, 1.0)], width_m, h, sides=120)
+    parted = scale_radially(body, lambda angle: 1 - cloves * (1 - np.abs(np.sin(4.5 * angle)) ** 0.7))
     model = Model().add("body", parted)
     long = neck * width_m
     stem = stalk([(0, 0, 0.92 * h), (0, 0, h + 0.4 * long), (0.12 * long, 0, h + long)], 0.21 * r, 0.13 * r, sides=16)
@@ -33,7 +33,9 @@ def garlic(*, width_m: float, tall: float, cloves: float, neck: float) -> Model:
     model.point("stem end", "tip", "stem", (0.12 * long, 0.0, h + long), (0.2, 0.0, 0.98))
     turn = np.pi / 9  # the crest of a clove: the number of cloves is odd
     side = (r * float(np.cos(turn)), r * float(np.sin(turn)), 0.36 * h)
-    return model.point("side", "surface", "body", side, (float(np.cos(turn)), float(np.sin(turn)), 0.0)).laid()
+    return model.point(
+        "side", "surface", "body", side, (float(np.cos(turn)), float(np.sin(turn)), 0.0)
+    ).rest_on_ground()
 
 
 @template("radish")
@@ -41,7 +43,7 @@ def radish(*, length_m: float, width: float, root: float, tops_m: float) -> Mode
     """Build a lying radish with cut stalks towards +X; ``length_m`` excludes them, ``root`` is the thin end's share."""
     wide, body_long = width * length_m, (1 - root) * length_m
     profile = [(0, 0.0), (0.3, 0.03), (0.7, 0.16), (0.97, 0.4), (1, 0.55), (0.88, 0.78), (0.55, 0.95), (0, 1.0)]
-    body = lying(turned(profile, wide, body_long)).translate((0.5 * length_m - body_long, 0, 0))
+    body = lay_along_x(smooth_revolution(profile, wide, body_long)).translate((0.5 * length_m - body_long, 0, 0))
     model = Model().add("body", body)
     low = 0.5 * length_m - body_long
     tail = stalk(
@@ -61,7 +63,7 @@ def radish(*, length_m: float, width: float, root: float, tops_m: float) -> Mode
     model.point("stem", "surface", "stem", (end + 0.5 * tops_m, 0.15 * wide, 0.0), (0.0, 1.0, 0.0))
     middle = low + 0.5 * body_long
     model.point("body", "surface", "body", (middle, 0.0, 0.5 * wide), (0.0, 0.0, 1.0))
-    return model.point("tip", "tip", "tip", (-0.5 * length_m, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("tip", "tip", "tip", (-0.5 * length_m, 0.0, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 def _round_root(width_m: float, tall: float, root: float, tops_m: float, parts: str) -> Model:
@@ -80,9 +82,9 @@ def _round_root(width_m: float, tall: float, root: float, tops_m: float, parts: 
     ]
 
     def laid(solid: Manifold) -> Manifold:
-        return lying(solid.translate((0, 0, -0.5 * h)))
+        return lay_along_x(solid.translate((0, 0, -0.5 * h)))
 
-    model = Model().add("body", laid(turned(profile, width_m, h)))
+    model = Model().add("body", laid(smooth_revolution(profile, width_m, h)))
     model.region("crown", "body", lambda c: c[:, 0] > 0.3 * h, parts)
     long = root * h
     tail = stalk(
@@ -99,7 +101,7 @@ def _round_root(width_m: float, tall: float, root: float, tops_m: float, parts: 
             "stalks",
         )
     model.point("top", "surface", "body", (0.05 * h, 0.0, 0.5 * width_m), (0.0, 0.0, 1.0))
-    return model.point("base", "surface", "body", (0.05 * h, 0.0, -0.5 * width_m), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "surface", "body", (0.05 * h, 0.0, -0.5 * width_m), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("beetroot")
@@ -142,4 +144,4 @@ def sweet_potato(*, length_m: float, width: float, bend: float, lumps: float) ->
     top, middle = r * float(half[18:24].max()), 20
     x, y = float(path[middle, 0]), float(path[middle, 1])
     model.point("top", "surface", "body", (x, y, top), (0.0, 0.0, 1.0))
-    return model.point("base", "surface", "body", (x, y, -top), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "surface", "body", (x, y, -top), (0.0, 0.0, -1.0)).rest_on_ground()

@@ -8,8 +8,8 @@ from manifold3d import Manifold
 from manitwin.geometry.solids.shapes import box, chords, cylinder, lathe, polygon, prism, rectangle, rounded, union
 from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.catalog.hand_tools import grip
-from manitwin.models.generators.templates.catalog.organic import lying
-from manitwin.models.generators.templates.catalog.vessel import hollowed
+from manitwin.models.generators.templates.catalog.organic import lay_along_x
+from manitwin.models.generators.templates.catalog.vessel import assemble_from_profile
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -39,11 +39,11 @@ def gavel(*, length_m: float, head: float, thick: float, grip_m: float) -> Model
         (1.15 * t, -end + 0.1 * length_m),
     ]
     stick += [(0.75 * t, 0.05 * length_m), (0.6 * t, at - 0.5 * r), (0.6 * t, at), (0, at)]
-    model.add("handle", lying(lathe(rounded(stick, 0.004))), "handle")
+    model.add("handle", lay_along_x(lathe(rounded(stick, 0.004))), "handle")
     model.region("face", "head", lambda c: np.abs(c[:, 1]) > 0.48 * long)
     model.point("striking face", "face", "face", (at, -0.5 * long, 0.0), (0.0, -1.0, 0.0))
     model.point("head", "surface", "head", (at, 0.32 * long, r), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (-0.28 * length_m, 0.0, t), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (-0.28 * length_m, 0.0, t), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("file")
@@ -70,7 +70,9 @@ def file(*, length_m: float, blade: float, width_m: float, thick: float, grip_m:
     model.region("tip", "shaft", lambda c: c[:, 0] > end - 0.004)
     model.point("tip", "tip", "tip", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     model.point("shaft", "edge", "shaft", (start + 0.35 * blade * length_m, -0.5 * width_m, 0.0), (0.0, -1.0, 0.0))
-    return model.point("handle", "surface", "handle", (0.5 * (start - end), 0.0, 0.6 * grip_m), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (0.5 * (start - end), 0.0, 0.6 * grip_m), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("awl")
@@ -81,11 +83,11 @@ def awl(*, length_m: float, blade: float, spike_m: float, grip_m: float) -> Mode
     bulb = [(0, -end), (0.6 * r, -end), (r, -end + 0.18 * (start + end)), (0.9 * r, -end + 0.45 * (start + end))]
     bulb += [(0.52 * r, -end + 0.78 * (start + end)), (0.46 * r, start), (0, start)]
     smooth = arc([(x, 0, z) for x, z in bulb[1:-1]], samples=28)[:, [0, 2]]
-    model = Model().add("handle", lying(lathe([(0, -end), *map(tuple, smooth), (0, start)])), "handle")
-    model.add("collar", lying(cylinder(0.4 * r, 0.012)).translate((start - 0.006, 0, 0)), "blade")
+    model = Model().add("handle", lay_along_x(lathe([(0, -end), *map(tuple, smooth), (0, start)])), "handle")
+    model.add("collar", lay_along_x(cylinder(0.4 * r, 0.012)).translate((start - 0.006, 0, 0)), "blade")
     model.add(
         "shaft",
-        lying(
+        lay_along_x(
             lathe(
                 [(0, start), (t, start), (t, end - 0.35 * blade * length_m), (0.0003, end), (0, end)], sides=chords(20)
             )
@@ -97,7 +99,7 @@ def awl(*, length_m: float, blade: float, spike_m: float, grip_m: float) -> Mode
     model.point("shaft", "surface", "shaft", (start + 0.3 * blade * length_m, 0.0, t), (0.0, 0.0, 1.0))
     return model.point(
         "handle", "surface", "handle", (-end + 0.3 * (start + end), 0.0, 0.97 * r), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("hacksaw")
@@ -161,7 +163,7 @@ def hacksaw(*, length_m: float, height: float, handle: float, bar_m: float) -> M
     model.region("blade tip", "blade", lambda c: c[:, 0] > end - 0.02)
     model.point("teeth", "edge", "blade", (0.5 * (start + end), low - 0.00625, 0.0), (0.0, -1.0, 0.0))
     model.point("blade tip", "tip", "blade tip", (end, low, 0.0), (1.0, 0.0, 0.0))
-    return model.point("handle", "surface", "handle", (-end, -0.1 * high, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("handle", "surface", "handle", (-end, -0.1 * high, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 def _bar(a: tuple[float, float], b: tuple[float, float], width_m: float) -> list[tuple[float, float]]:
@@ -186,7 +188,9 @@ def socket_wrench(*, length_m: float, head: float, thick: float, socket: float, 
     model.add("handle", _knurled(-end, start, 0.5 * h), "handle")
     model.point("jaw", "tip", "tip", (at, 0.0, 1.4 * h), (0.0, 0.0, 1.0))
     model.point("head", "surface", "head", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("handle", "surface", "handle", (0.5 * (start - end), 0.0, 0.5 * h), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (0.5 * (start - end), 0.0, 0.5 * h), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 def _knurled(start_m: float, end_m: float, radius_m: float) -> Manifold:
@@ -197,7 +201,7 @@ def _knurled(start_m: float, end_m: float, radius_m: float) -> Manifold:
         * (1 - 0.05 * (np.arange(33) % 3 == 1))
         * np.minimum(1.0, np.sqrt(np.minimum(share, 1 - share) / 0.04 + 0.3))
     )
-    return lying(lathe(np.column_stack([radii, start_m + share * (end_m - start_m)])))
+    return lay_along_x(lathe(np.column_stack([radii, start_m + share * (end_m - start_m)])))
 
 
 _BANDS = ((0.4, 0.55), (0.68, 0.8))
@@ -250,7 +254,7 @@ def toy_bucket(*, height_m: float, width: float, taper: float, wall_m: float) ->
     )
     bow[0], bow[-1] = (-1.0 * r, 0.0, 0.965 * h), (1.0 * r, 0.0, 0.965 * h)
     handle = tube(bow, 0.0045, flatten=0.55, across=(0, 0, 1))
-    return hollowed(Model(), profile, wall_m, 1.4 * wall_m, ("handle", handle))
+    return assemble_from_profile(Model(), profile, wall_m, 1.4 * wall_m, ("handle", handle))
 
 
 @template("fly swatter")
@@ -270,8 +274,10 @@ def fly_swatter(*, length_m: float, head: float, wide: float, thick_m: float) ->
     ]
     model.perforate("holes", lambda: union([hole.translate((*place, 0)) for place in at]))
     start = -end + 0.24 * length_m
-    rod = lying(cylinder(0.0024, end - long - start + 0.03)).translate((start - 0.01, 0, 0))
+    rod = lay_along_x(cylinder(0.0024, end - long - start + 0.03)).translate((start - 0.01, 0, 0))
     model.add("shaft", rod, "handle").add("handle", grip(-end, start, 0.0075, flatten=0.6, swell=0.1), "handle")
     model.point("head", "surface", "head", (end - 0.04 * long, 0.0, 0.5 * thick_m), (0.0, 0.0, 1.0))
     model.point("front edge", "edge", "head", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("handle", "surface", "handle", (0.5 * (start - end), 0.0, 0.0048), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (0.5 * (start - end), 0.0, 0.0048), (0.0, 0.0, 1.0)
+    ).rest_on_ground()

@@ -7,8 +7,8 @@ from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import box, chords, cylinder, ellipsoid, lathe, rounded
 from manitwin.geometry.solids.sweep import tube
-from manitwin.models.generators.templates.catalog.organic import lying, stalk, turned
-from manitwin.models.generators.templates.catalog.vessel import bulge
+from manitwin.models.generators.templates.catalog.organic import lay_along_x, smooth_revolution, stalk
+from manitwin.models.generators.templates.catalog.vessel import smooth_profile
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -23,7 +23,7 @@ def chili_pepper(*, length_m: float, width: float, bend: float, stem_m: float) -
     half = r * np.interp(along, [0, 0.03, 0.2, 0.6, 0.9, 0.98, 1.0], [0.06, 0.16, 0.5, 0.9, 1.0, 0.8, 0.5])
     path = np.column_stack([(along - 0.5) * n, bend * n * (1 - along) ** 2, 0 * along])
     model = Model().add("body", tube(path, half, sides=chords(24)))
-    calyx = lying(cylinder(0.62 * r, 0.05 * n + 0.002, top_radius_m=0.3 * r, sides=chords(20)))
+    calyx = lay_along_x(cylinder(0.62 * r, 0.05 * n + 0.002, top_radius_m=0.3 * r, sides=chords(20)))
     model.add("calyx", calyx.translate((0.49 * n, 0, 0)), "stem")
     tip = (0.5 * n + stem_m, -0.12 * stem_m, 0.0)
     model.add(
@@ -39,7 +39,7 @@ def chili_pepper(*, length_m: float, width: float, bend: float, stem_m: float) -
         "body",
         (0.2 * n, float(np.interp(0.7, along, path[:, 1])), float(np.interp(0.7, along, half))),
         (0.0, 0.0, 1.0),
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("grape")
@@ -50,7 +50,7 @@ def grape(*, length_m: float, width: float, stem_m: float) -> Model:
     end = 0.5 * n + stem_m
     model.add("stem", stalk([(0.47 * n, 0, 0), (0.5 * n, 0, 0), (end, 0, 0)], 0.0011, 0.0009), "stem")
     model.point("stem end", "tip", "stem", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("side", "surface", "body", (0.0, -0.5 * y, 0.0), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "body", (0.0, -0.5 * y, 0.0), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("blueberry")
@@ -68,14 +68,14 @@ def blueberry(*, width_m: float, tall: float, crown: float) -> Model:
         (0.2, 1.0),
         (0, 1.0),
     ]
-    model = Model().add("body", turned(profile, width_m, h))
+    model = Model().add("body", smooth_revolution(profile, width_m, h))
     wide = crown * r
     rim = cylinder(0.9 * wide, 0.1 * h, top_radius_m=1.1 * wide, sides=10) - cylinder(
         0.62 * wide, 0.2 * h, sides=chords(16)
     )
     model.add("crown", rim.translate((0, 0, 0.95 * h)), "crown")
     model.point("crown", "surface", "crown", (0.0, -0.95 * wide, 1.03 * h), (0.0, -0.3, 0.954))
-    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("snack bar")
@@ -93,7 +93,7 @@ def snack_bar(*, length_m: float, width: float, thick: float, crimp: float) -> M
         end = box(crimp * n, y, 0.0012).translate((side * 0.5 * (n - crimp * n), 0, 0.5 * t - 0.0006))
         model.add("ends", end, "ends")
     model.point("front", "face", "body", (0.0, 0.0, t), (0.0, 0.0, 1.0))
-    return model.point("end", "edge", "ends", (0.5 * n, 0.0, 0.5 * t), (1.0, 0.0, 0.0)).laid()
+    return model.point("end", "edge", "ends", (0.5 * n, 0.0, 0.5 * t), (1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("pizza")
@@ -131,12 +131,12 @@ def pizza(*, width_m: float, thick: float, rim: float, slices: float) -> Model:
 def burrito(*, length_m: float, width: float, foil: float) -> Model:
     """Build a lying wrap whose lower end towards -X is in foil up to ``foil`` of the length."""
     n, r = length_m, 0.5 * width * length_m
-    side = bulge([(0.86 * r, -0.5 * n), (0.98 * r, -0.25 * n), (r, 0.1 * n), (0.9 * r, 0.47 * n)])
+    side = smooth_profile([(0.86 * r, -0.5 * n), (0.98 * r, -0.25 * n), (r, 0.1 * n), (0.9 * r, 0.47 * n)])
     model = Model().add(
-        "body", lying(lathe(rounded([(0.0, -0.5 * n), *side, (0.6 * r, 0.5 * n), (0.0, 0.5 * n)], 0.2 * r)))
+        "body", lay_along_x(lathe(rounded([(0.0, -0.5 * n), *side, (0.6 * r, 0.5 * n), (0.0, 0.5 * n)], 0.2 * r)))
     )
     edge = (foil - 0.5) * n
-    wrap = bulge([(0.88 * r, -0.505 * n), (1.01 * r, -0.25 * n), (1.03 * r, edge)])
-    model.add("foil", lying(lathe([(0.0, -0.505 * n), *wrap, (0.0, edge)])), "foil")
+    wrap = smooth_profile([(0.88 * r, -0.505 * n), (1.01 * r, -0.25 * n), (1.03 * r, edge)])
+    model.add("foil", lay_along_x(lathe([(0.0, -0.505 * n), *wrap, (0.0, edge)])), "foil")
     model.point("end", "face", "body", (0.5 * n, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("upper side", "surface", "body", (0.2 * n, 0.0, 0.97 * r), (0.0, 0.0, 1.0)).laid()
+    return model.point("upper side", "surface", "body", (0.2 * n, 0.0, 0.97 * r), (0.0, 0.0, 1.0)).rest_on_ground()

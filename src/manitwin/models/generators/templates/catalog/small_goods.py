@@ -6,7 +6,7 @@ import numpy as np
 
 from manitwin.geometry.solids.shapes import box, chords, cylinder, lathe, polygon, prism, rectangle, rounded
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.organic import lying
+from manitwin.models.generators.templates.catalog.organic import lay_along_x
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -25,10 +25,10 @@ def cosmetic_tube(*, length_m: float, width: float, cap: float, waist: float) ->
         0.2 * r,
     )
     ring = [(0, joint - 0.02 * n), (1.02 * r, joint - 0.02 * n), (1.02 * r, joint), (0, joint)]
-    model = Model().add("body", lying(lathe(barrel)))
-    model.add("ring", lying(lathe(ring)), "ring").add("cap", lying(lathe(cover)), "cap")
+    model = Model().add("body", lay_along_x(lathe(barrel)))
+    model.add("ring", lay_along_x(lathe(ring)), "ring").add("cap", lay_along_x(lathe(cover)), "cap")
     model.point("cap end", "face", "cap", (0.5 * n, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("barrel", "surface", "body", (-0.25 * n, 0.0, r), (0.0, 0.0, 1.0)).laid()
+    return model.point("barrel", "surface", "body", (-0.25 * n, 0.0, r), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("makeup brush")
@@ -58,8 +58,10 @@ def makeup_brush(*, length_m: float, head: float, width: float, ferrule: float, 
             (0, 0, tip),
         ]
     )
-    model = Model().add("handle", lying(lathe(rounded(stick, 0.3 * thin))), "")
-    model.add("ferrule", lying(lathe(metal)), "ferrule").add("bristles", lying(lathe(curve[:, [0, 2]])), "bristles")
+    model = Model().add("handle", lay_along_x(lathe(rounded(stick, 0.3 * thin))), "")
+    model.add("ferrule", lay_along_x(lathe(metal)), "ferrule").add(
+        "bristles", lay_along_x(lathe(curve[:, [0, 2]])), "bristles"
+    )
     model.point("bristles", "tip", "bristles", (tip, 0.0, 0.0), (1.0, 0.0, 0.0))
     return model.point(
         "handle",
@@ -67,7 +69,7 @@ def makeup_brush(*, length_m: float, head: float, width: float, ferrule: float, 
         "handle",
         (-0.2 * n, 0.0, float(np.interp(-0.2, [-0.49, -0.1], [0.5, 1.0])) * thin),
         (0.0, 0.0, 1.0),
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("bandage roll")
@@ -103,11 +105,11 @@ def cigar(*, length_m: float, width: float, band: float) -> Model:
             (0.84 * r, 0, 0.5 * n),
         ]
     )
-    model = Model().add("body", lying(lathe([*curve[:, [0, 2]].tolist(), (0.0, 0.5 * n)])))
+    model = Model().add("body", lay_along_x(lathe([*curve[:, [0, 2]].tolist(), (0.0, 0.5 * n)])))
     ring = cylinder(1.03 * r, band * n).translate((0, 0, -0.33 * n))
-    model.add("band", lying(ring), "band")
+    model.add("band", lay_along_x(ring), "band")
     model.point("tip", "face", "body", (0.5 * n, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("body", "surface", "body", (0.1 * n, 0.0, r), (0.0, 0.0, 1.0)).laid()
+    return model.point("body", "surface", "body", (0.1 * n, 0.0, r), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("pocket knife")
@@ -133,7 +135,7 @@ def pocket_knife(*, length_m: float, width: float, thick: float, bolster: float)
         )
         model.add("pin", pin, "pin")
     model.point("blade", "edge", "blade", (0.0, -0.57 * y, 0.5 * t), (0.0, -1.0, 0.0))
-    return model.point("handle", "face", "body", (-0.1 * n, 0.0, t), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "face", "body", (-0.1 * n, 0.0, t), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("memory card")
@@ -155,7 +157,7 @@ def memory_card(*, length_m: float, width: float, thick: float, corner: float) -
         at = (number - 3) * 0.11 * y - 0.05 * y
         model.add("contacts", box(0.16 * n, 0.07 * y, 0.00012).translate((0.38 * n, at, -0.00006)), "contacts")
     model.point("front", "face", "label", (-0.1 * n, 0.0, t), (0.0, 0.0, 1.0))
-    return model.point("edge", "edge", "body", (0.5 * n, -0.1 * y, 0.5 * t), (1.0, 0.0, 0.0)).laid()
+    return model.point("edge", "edge", "body", (0.5 * n, -0.1 * y, 0.5 * t), (1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("id card")
@@ -168,7 +170,7 @@ def id_card(*, length_m: float, width: float, thick_m: float, photo: float) -> M
     stripe = prism(rectangle(0.98 * n, 0.14 * y), 0.0001).translate((0, 0.37 * y, t - 0.00004))
     model.add("stripe", stripe, "stripe")
     model.point("front", "face", "body", (0.2 * n, -0.1 * y, t), (0.0, 0.0, 1.0))
-    return model.point("edge", "edge", "body", (0.5 * n, 0.0, 0.5 * t), (1.0, 0.0, 0.0)).laid()
+    return model.point("edge", "edge", "body", (0.5 * n, 0.0, 0.5 * t), (1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("binder clip")
@@ -207,7 +209,7 @@ def binder_clip(*, length_m: float, tall: float, deep: float, levers: float) -> 
         )
         model.add("levers", tube(path, wire, sides=chords(10)), "levers")
     model.point("jaws", "edge", "jaws", (0.0, 0.0, h), (0.0, 0.0, 1.0))
-    return model.point("lever", "surface", "levers", (0.0, -0.5 * y, 0.25 * h), (0.0, -1.0, 0.0)).laid()
+    return model.point("lever", "surface", "levers", (0.0, -0.5 * y, 0.25 * h), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("thumbtack")
@@ -226,10 +228,10 @@ def push_pin(*, length_m: float, head: float, width: float) -> Model:
         (0, end),
     ]
     needle = [(0, end - 0.001), (0.0006, end - 0.001), (0.0005, 0.42 * n), (0, 0.5 * n)]
-    model = Model().add("body", lying(lathe(rounded(grip, 0.05 * n), sides=chords(40))))
-    model.add("needle", lying(lathe(needle, sides=chords(12))), "needle")
+    model = Model().add("body", lay_along_x(lathe(rounded(grip, 0.05 * n), sides=chords(40))))
+    model.add("needle", lay_along_x(lathe(needle, sides=chords(12))), "needle")
     model.point("needle", "tip", "needle", (0.5 * n, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("grip", "surface", "body", (-0.5 * n, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("grip", "surface", "body", (-0.5 * n, 0.0, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("foam brick")

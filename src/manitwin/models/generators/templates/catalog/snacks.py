@@ -17,7 +17,7 @@ from manitwin.geometry.solids.shapes import (
     union,
 )
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.organic import lying, ribbed
+from manitwin.models.generators.templates.catalog.organic import lay_along_x, scale_radially
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -34,10 +34,10 @@ def lollipop(*, width_m: float, thick: float, stick_m: float, stick_width_m: flo
     for sign in (1.0, -1.0):
         line = tube(spiral * [1, 1, sign], 0.05 * r, sides=8, across=(0, 0, 1))
         model.add("spiral", line ^ box(3 * r, 3 * r, 1.06 * h).translate((0, 0, -0.53 * h)), "spiral")
-    rod = lying(cylinder(0.5 * stick_width_m, stick_m + 0.5 * r)).translate((0.5 * r, 0, 0))
+    rod = lay_along_x(cylinder(0.5 * stick_width_m, stick_m + 0.5 * r)).translate((0.5 * r, 0, 0))
     model.add("stick", rod, "stick")
     model.point("top", "surface", "body", (0.0, 0.0, 0.5 * h), (0.0, 0.0, 1.0))
-    return model.point("base", "surface", "body", (0.0, 0.0, -0.5 * h), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "surface", "body", (0.0, 0.0, -0.5 * h), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("popsicle")
@@ -62,7 +62,7 @@ def popsicle(*, length_m: float, width: float, thick: float, stick: float) -> Mo
     model.point(
         "stick", "surface", "stick", (0.5 * length_m - 0.4 * stick * length_m, 0.0, 0.5 * h + 0.0011), (0.0, 0.0, 1.0)
     )
-    return model.point("ice", "surface", "body", (low + 0.5 * ice, 0.0, h), (0.0, 0.0, 1.0)).laid()
+    return model.point("ice", "surface", "body", (low + 0.5 * ice, 0.0, h), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("ice cream cone")
@@ -77,19 +77,21 @@ def ice_cream_cone(*, length_m: float, width: float, scoop: float, tip: float) -
         for r, z in zip(np.linspace(tip, 0.5, 9)[1:] * mouth, np.linspace(0.0, long, 9)[1:], strict=True)
     ]
     cone = union([wall, *ribs])
-    drip = ribbed(torus(0.5 * mouth, 0.055 * mouth), lambda a: 1 + 0.05 * np.cos(7 * a)).translate((0, 0, long + 0.004))
+    drip = scale_radially(torus(0.5 * mouth, 0.055 * mouth), lambda a: 1 + 0.05 * np.cos(7 * a)).translate(
+        (0, 0, long + 0.004)
+    )
     ice = ellipsoid(ball, ball, ball).translate((0, 0, long + depth)) + drip
     tilt = float(np.degrees(np.arctan2(0.5 * ball - tip * mouth, long + depth)))
 
     model = Model()
     for name, solid, slot in (("cone", cone, ""), ("ice cream", ice, "ice cream")):
-        model.add(name, lying(solid.mirror((0, 0, 1))).rotate((0, tilt, 0)), slot)
+        model.add(name, lay_along_x(solid.mirror((0, 0, 1))).rotate((0, tilt, 0)), slot)
     ahead = (float(np.cos(np.radians(tilt))), 0.0, -float(np.sin(np.radians(tilt))))
     model.region("tip", "cone", lambda c: c @ np.array(ahead) > -0.12 * long)
     model.point("cone tip", "tip", "tip", (0.0, 0.0, 0.0), ahead)
     center = -(long + depth) * np.array(ahead)
     top = (float(center[0]), 0.0, float(center[2]) + 0.5 * ball)
-    return model.point("ice cream", "surface", "ice cream", top, (0.0, 0.0, 1.0)).laid()
+    return model.point("ice cream", "surface", "ice cream", top, (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("butter stick")
@@ -132,7 +134,7 @@ def sushi(*, length_m: float, width: float, rice: float, fish: float) -> Model:
     at = -0.25 * length_m
     z = float(np.interp(at, path[:, 0], path[:, 2])) + 0.47 * thick
     model.point("top", "surface", "body", (at, 0.0, z), (0.0, 0.0, 1.0))
-    return model.point("base", "face", "rice", (at, 0.0, 0.0), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "face", "rice", (at, 0.0, 0.0), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("pretzel")
@@ -167,4 +169,4 @@ def pretzel(*, width_m: float, thick: float, tall: float) -> Model:
         (1.0, 0.0, 0.0),
     )
     model.region("hole", "body", lambda c: np.hypot(c[:, 0] - 0.55 * x, c[:, 1]) < 0.36 * x)
-    return model.point("inner side", "hole", "hole", (0.55 * x, 0.0, r), (0.0, 0.0, 1.0)).laid()
+    return model.point("inner side", "hole", "hole", (0.55 * x, 0.0, r), (0.0, 0.0, 1.0)).rest_on_ground()

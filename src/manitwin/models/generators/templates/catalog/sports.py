@@ -7,8 +7,8 @@ from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import box, chords, cylinder, ellipsoid, lathe, rounded, torus, union
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.balls import laid_ball, sphere
-from manitwin.models.generators.templates.catalog.organic import lying
+from manitwin.models.generators.templates.catalog.balls import finish_ball, sphere
+from manitwin.models.generators.templates.catalog.organic import lay_along_x
 from manitwin.models.generators.templates.template import Model, template
 
 STRINGS, STRING_M = (18, 16), 0.0014
@@ -37,7 +37,7 @@ def basketball(*, width_m: float, seam: float, bow: float) -> Model:
         closed = np.vstack([bent, bent[:2]]) * [side, 1, 1]
         lines += [_seam(closed[:42], r, half), _seam(closed[40:], r, half)]
     model.cut("seams", union(lines), "seams")
-    return laid_ball(model, width_m)
+    return finish_ball(model, width_m)
 
 
 @template("volleyball")
@@ -58,7 +58,7 @@ def volleyball(*, width_m: float, seam: float) -> Model:
         return np.asarray(np.abs(across / size.max(axis=1)) < 0.33)
 
     model.region("strips", "body", striped, "strips")
-    return laid_ball(model, width_m, top="strips", side="strips")
+    return finish_ball(model, width_m, top="strips", side="strips")
 
 
 def _curved_seam(width_m: float, half_width_m: float) -> Manifold:
@@ -73,7 +73,7 @@ def _curved_seam(width_m: float, half_width_m: float) -> Manifold:
 def softball(*, width_m: float, seam_m: float) -> Model:
     """Build a softball with its seam."""
     model = Model().add("body", sphere(width_m, 64)).add("seam", _curved_seam(width_m, seam_m), "seam")
-    return laid_ball(model, width_m)
+    return finish_ball(model, width_m)
 
 
 @template("cricket ball")
@@ -87,7 +87,7 @@ def cricket_ball(*, width_m: float, seam_m: float) -> Model:
     ]
     model.add("seam", union(rows), "seam")
     model.point("top", "surface", "body", (0.0, 0.0, r), (0.0, 0.0, 1.0))
-    return model.point("side", "surface", "seam", (0.0, -r, 0.025 * r), (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "seam", (0.0, -r, 0.025 * r), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("bocce ball")
@@ -98,13 +98,13 @@ def bocce_ball(*, width_m: float, rings: float, groove_m: float) -> Model:
     heights = (np.arange(count) - 0.5 * (count - 1)) * 0.16 * r
     cuts = [torus(float(np.sqrt(r**2 - z**2)), groove_m, sides=chords(72)).translate((0, 0, float(z))) for z in heights]
     model.cut("grooves", union(cuts).rotate((35, 0, 0)))
-    return laid_ball(model, width_m)
+    return finish_ball(model, width_m)
 
 
 @template("steel ball")
 def steel_ball(*, width_m: float) -> Model:
     """Build a bearing ball."""
-    return laid_ball(Model().add("body", sphere(width_m, 48)), width_m)
+    return finish_ball(Model().add("body", sphere(width_m, 48)), width_m)
 
 
 @template("kettlebell")
@@ -131,7 +131,7 @@ def kettlebell(*, height_m: float, body: float, grip_m: float, foot: float) -> M
     model.region("base", "body", lambda c: c[:, 2] < 0.01 * ball)
     model.point("handle", "surface", "handle", (0.0, 0.0, float(path[:, 2].max()) + t), (0.0, 0.0, 1.0))
     model.point("body", "surface", "body", (0.0, -r, ball - r), (0.0, -1.0, 0.0))
-    return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 def _racket(
@@ -172,14 +172,16 @@ def _racket(
             )
             model.add("shaft", tube(arm, 0.9 * frame_m, sides=14, across=(0, 0, 1)))
     else:
-        model.add("shaft", lying(cylinder(shaft_m, low + 2 * frame_m - handle + 0.02)).translate((handle - 0.02, 0, 0)))
+        model.add(
+            "shaft", lay_along_x(cylinder(shaft_m, low + 2 * frame_m - handle + 0.02)).translate((handle - 0.02, 0, 0))
+        )
     eight = cylinder(grip_m, grip * length_m, sides=8).rotate((0, 0, 22.5))
     butt = cylinder(1.12 * grip_m, 0.012, sides=8).rotate((0, 0, 22.5))
-    model.add("handle", lying(eight + butt).translate((-0.5 * length_m, 0, 0)), "handle")
+    model.add("handle", lay_along_x(eight + butt).translate((-0.5 * length_m, 0, 0)), "handle")
     model.point("head", "axis", "strings", (cx, 0.0, 0.0), (0.0, 0.0, 1.0))
     model.point("front edge", "tip", "head", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0))
     middle = -0.5 * length_m + 0.5 * grip * length_m
-    return model.point("handle", "surface", "handle", (middle, 0.0, 0.92 * grip_m), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (middle, 0.0, 0.92 * grip_m), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 def _between_strings(half_x_m: float, half_y_m: float) -> Manifold:
@@ -222,11 +224,11 @@ def drum_stick(*, length_m: float, width_m: float, taper: float, bead: float) ->
         (taper * r, end - 0.014),
     ]
     tip = [(0.9 * bead * r, end - 0.01), (bead * r, end - 0.006), (0.75 * bead * r, end - 0.001), (0.3 * bead * r, end)]
-    model = Model().add("shaft", lying(lathe([(0, -end), *profile, (0, end - 0.014)])))
-    model.add("tip", lying(lathe([(0, end - 0.0148), (taper * r, end - 0.0148), *tip, (0, end)])), "tip")
+    model = Model().add("shaft", lay_along_x(lathe([(0, -end), *profile, (0, end - 0.014)])))
+    model.add("tip", lay_along_x(lathe([(0, end - 0.0148), (taper * r, end - 0.0148), *tip, (0, end)])), "tip")
     model.point("tip", "tip", "tip", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     model.point("shaft", "surface", "shaft", (0.0, 0.0, r), (0.0, 0.0, 1.0))
-    return model.point("shaft end", "face", "shaft", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("shaft end", "face", "shaft", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("maraca")
@@ -238,7 +240,7 @@ def maraca(*, length_m: float, head: float, width: float, grip_m: float) -> Mode
 
     def laid(solid: Manifold) -> Manifold:
         """Move a solid about Z, with the head's centre at the origin, to rest on its head and the end of its handle."""
-        return lying(solid.translate((0, 0, -ball))).rotate((0, float(np.degrees(-tilt)), 0))
+        return lay_along_x(solid.translate((0, 0, -ball))).rotate((0, float(np.degrees(-tilt)), 0))
 
     stick = [(0, 0.0), (1.15 * t, 0.0), (1.25 * t, 0.008), (0.85 * t, 0.03), (t, 0.4 * (length_m - long))]
     stick += [(0.8 * t, length_m - long - 0.01), (1.3 * t, length_m - 0.94 * long), (0, length_m - 0.9 * long)]
@@ -250,4 +252,4 @@ def maraca(*, length_m: float, head: float, width: float, grip_m: float) -> Mode
     model.point("tip", "tip", "head", (0.5 * long * ahead[0], 0.0, 0.5 * long * ahead[2]), ahead)
     model.point("head", "surface", "stripe", (0.0, -r - 0.0006, 0.0), (0.0, -1.0, 0.0))
     handle = (at * ahead[0] - t * ahead[2], 0.0, at * ahead[2] + t * ahead[0])
-    return model.point("handle", "surface", "handle", handle, (-ahead[2], 0.0, ahead[0])).laid()
+    return model.point("handle", "surface", "handle", handle, (-ahead[2], 0.0, ahead[0])).rest_on_ground()

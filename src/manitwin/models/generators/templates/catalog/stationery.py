@@ -23,7 +23,7 @@ from manitwin.geometry.solids.sweep import tube
 from manitwin.models.generators.templates.template import Model, template
 
 
-def _lying(profile: list[Point], sides: int = 36) -> Manifold:
+def _lathe_along_x(profile: list[Point], sides: int = 36) -> Manifold:
     """Return a solid of revolution whose axis lies along X."""
     return lathe(profile, sides=sides).rotate((0, 90, 0))
 
@@ -34,12 +34,12 @@ def crayon(*, length_m: float, width: float, sleeve: float) -> Model:
     end, r = 0.5 * length_m, 0.5 * width * length_m
     tip = end - 2.2 * r
     body = [(0, -end), (r, -end), (r, tip), (0.8 * r, tip + 0.0005), (0.34 * r, end), (0, end)]
-    model = Model().add("barrel", _lying(body))
+    model = Model().add("barrel", _lathe_along_x(body))
     model.region("tip", "barrel", lambda centers: centers[:, 0] > tip + 0.0004)
     start, stop = -sleeve * end, min(sleeve * end, tip - 0.002)
-    model.add("sleeve", _lying([(0, start), (1.04 * r, start), (1.04 * r, stop), (0, stop)]), "sleeve")
+    model.add("sleeve", _lathe_along_x([(0, start), (1.04 * r, start), (1.04 * r, stop), (0, stop)]), "sleeve")
     model.point("tip", "tip", "tip", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("barrel", "surface", "sleeve", (0.0, 0.0, 1.04 * r), (0.0, 0.0, 1.0)).laid()
+    return model.point("barrel", "surface", "sleeve", (0.0, 0.0, 1.04 * r), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("paper clip")
@@ -68,7 +68,7 @@ def _wire(path: np.ndarray, end: float, wire_m: float) -> Model:
     model.point("loop", "surface", "wire", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     return model.point(
         "opening", "surface", "wire", (float(path[0, 0]), float(path[0, 1]), 0.5 * wire_m), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("sticky notes")
@@ -230,7 +230,7 @@ def globe(*, height_m: float, ball: float, base: float) -> Model:
     sphere = ellipsoid(2 * r, 2 * r, 2 * r, sides=64).rotate((0, 23.5, 0)).translate((0, 0, middle))
     model.add("ball", sphere).add("land", _land(r).translate((0, 0, middle)), "land")
     model.point("ball", "surface", "ball", (0.0, -r, middle), (0.0, -1.0, 0.0))
-    return model.point("base", "face", "base", (0.5 * foot, 0.0, 0.0), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "face", "base", (0.5 * foot, 0.0, 0.0), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("paperweight")

@@ -6,7 +6,7 @@ import numpy as np
 
 from manitwin.geometry.solids.shapes import box, chords, cylinder, lathe, polygon, prism, rectangle, rounded, union
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.vessel import bulge, hollowed, shell
+from manitwin.models.generators.templates.catalog.vessel import assemble_from_profile, shell, smooth_profile
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -23,10 +23,10 @@ def sugar_bowl(*, height_m: float, width: float, foot: float, mouth: float, wall
         model.point(
             "handle", "surface", "handle", (sign * float(far[0] + 0.75 * thick), 0.0, float(far[2])), (sign, 0.0, 0.0)
         )
-    return hollowed(model, bulge([(foot * r, 0.0), *side]), wall_m, 1.5 * wall_m, *ears)
+    return assemble_from_profile(model, smooth_profile([(foot * r, 0.0), *side]), wall_m, 1.5 * wall_m, *ears)
 
 
-def _poured(
+def _oval_jug(
     outer_profile: list[tuple[float, float]], wall_m: float, floor_m: float, *, long: float, lip: float, handle: float
 ) -> Model:
     """Build an oval jug: a body of the given profile, ``long`` times as long as wide, with a lip and a handle opposite."""
@@ -71,15 +71,15 @@ def _poured(
     tip = pulled(np.array([[-outer_profile[-1][0], 0.0, h]]))[0]
     model.point("spout", "tip", "spout", (float(tip[0]), 0.0, float(tip[2])), (-0.8, 0.0, 0.6))
     model.point("opening", "opening", "rim", (0.0, 0.0, h), (0.0, 0.0, 1.0))
-    return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)).laid()
+    return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)).rest_on_ground()
 
 
 @template("milk pourer")
 def milk_pourer(*, height_m: float, width: float, lip: float, handle: float, wall_m: float) -> Model:
     """Build a small milk jug; ``lip`` and ``handle`` are how far they protrude relative to half its width."""
     h, r = height_m, 0.5 * width * height_m
-    profile = bulge([(0.7 * r, 0.0), (0.97 * r, 0.16 * h), (r, 0.36 * h), (0.78 * r, 0.72 * h), (0.8 * r, h)])
-    return _poured(profile, wall_m, 1.5 * wall_m, long=1.0, lip=lip, handle=handle)
+    profile = smooth_profile([(0.7 * r, 0.0), (0.97 * r, 0.16 * h), (r, 0.36 * h), (0.78 * r, 0.72 * h), (0.8 * r, h)])
+    return _oval_jug(profile, wall_m, 1.5 * wall_m, long=1.0, lip=lip, handle=handle)
 
 
 @template("gravy boat")
@@ -89,8 +89,8 @@ def gravy_boat(*, height_m: float, width: float, long: float, lip: float, handle
     ``lip`` and ``handle`` are how far they protrude relative to half the width.
     """
     h, r = height_m, 0.5 * width * height_m
-    profile = bulge([(0.5 * r, 0.0), (0.46 * r, 0.1 * h), (0.84 * r, 0.36 * h), (0.97 * r, 0.68 * h), (r, h)])
-    return _poured(profile, wall_m, 0.14 * h, long=long, lip=lip, handle=handle)  # solid up to its waist
+    profile = smooth_profile([(0.5 * r, 0.0), (0.46 * r, 0.1 * h), (0.84 * r, 0.36 * h), (0.97 * r, 0.68 * h), (r, h)])
+    return _oval_jug(profile, wall_m, 0.14 * h, long=long, lip=lip, handle=handle)  # solid up to its waist
 
 
 @template("butter dish")
@@ -142,7 +142,7 @@ def utensil_holder(*, height_m: float, width: float, taper: float, wall_m: float
     h, r = height_m, 0.5 * width * height_m
     profile = rounded([(0.96 * taper * r, 0.0), (taper * r, 0.006), (r, h)], 0.005)
     model = Model()
-    model = hollowed(model, profile, wall_m, 1.4 * wall_m)
+    model = assemble_from_profile(model, profile, wall_m, 1.4 * wall_m)
     for share in (0.16, 0.86):
         wide = r * (taper + (1 - taper) * share)
         ring = lathe(

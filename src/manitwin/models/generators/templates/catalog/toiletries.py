@@ -24,7 +24,9 @@ def toothbrush(*, length_m: float, head: float, thick_m: float) -> Model:
     tuft = box(0.9 * long, 0.8 * thick_m, 0.0125, radius_m=0.001).translate((end - 0.5 * long - 0.002, 0, 0))
     model.add("bristles", tuft, "bristles").region("head", "handle", lambda centers: centers[:, 0] > end - 1.05 * long)
     model.point("bristles", "face", "bristles", (end - 0.5 * long - 0.002, 0.0, 0.0125), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (-0.25 * length_m, 0.0, 0.31 * thick_m), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (-0.25 * length_m, 0.0, 0.31 * thick_m), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("soap")
@@ -74,7 +76,7 @@ def hairbrush(*, length_m: float, head: float, width_m: float) -> Model:
                 )
                 model.add("bristles", pin, "bristles")
     model.point("bristles", "face", "bristles", (at, 0.0, 0.03), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (-0.3 * length_m, 0.0, 0.0155), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (-0.3 * length_m, 0.0, 0.0155), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("razor")
@@ -92,7 +94,7 @@ def razor(*, length_m: float, head_m: float, thick_m: float) -> Model:
             "blades", box(0.0012, 0.88 * head_m, 0.002).translate((end - 0.017 + 0.004 * number, 0, 0.0042)), "blades"
         )
     model.point("blades", "edge", "blades", (end - 0.013, 0.0, 0.0062), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (-0.2 * length_m, 0.0, 0.006), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (-0.2 * length_m, 0.0, 0.006), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("tissue box")
@@ -125,7 +127,9 @@ def hand_mirror(*, length_m: float, glass: float, thick_m: float) -> Model:
     model.cut("rim", cylinder(0.88 * radius, thick_m).translate((at, 0, thick_m - 0.0025)))
     model.add("glass", cylinder(0.89 * radius, 0.002).translate((at, 0, thick_m - 0.004)), "glass")
     model.point("glass", "face", "glass", (at, 0.0, thick_m - 0.002), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (-0.35 * length_m, 0.0, 0.9 * thick_m), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (-0.35 * length_m, 0.0, 0.9 * thick_m), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("toothpaste")
@@ -152,7 +156,7 @@ def toothpaste(*, length_m: float, width_m: float, cap_m: float) -> Model:
     model.point("cap", "surface", "cap", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0))
     return model.point(
         "tube", "surface", "tube", (0.0, 0.0, float(np.interp(0.55, share, half_z))), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("ring")
@@ -164,7 +168,7 @@ def ring(*, width_m: float, thick_m: float, stone_m: float) -> Model:
     model.point("hole", "hole", "band", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     return model.point(
         "stone", "surface", "stone", (0.5 * width_m - 0.3 * thick_m + 0.4 * stone_m, 0.0, 0.0), (1.0, 0.0, 0.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("bracelet")
@@ -172,7 +176,7 @@ def bracelet(*, width_m: float, thick_m: float, broad: float) -> Model:
     """Build a lying closed bangle; ``broad`` is its breadth relative to its thickness."""
     band = torus(0.5 * (width_m - thick_m), 0.5 * thick_m).scale((1, 1, broad))
     model = Model().add("band", band)
-    return model.point("hole", "hole", "band", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)).laid()
+    return model.point("hole", "hole", "band", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("dental floss")
@@ -212,7 +216,9 @@ def umbrella(*, length_m: float, width_m: float, grip: float) -> Model:
     )
     model.add("tip", cylinder(0.004, 0.01).rotate((0, 90, 0)).translate((end - 0.01, 0, 0)), "handle")
     model.point("tip", "tip", "tip", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("handle", "surface", "handle", (0.5 * (start - end), 0.0, 0.67 * r), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (0.5 * (start - end), 0.0, 0.67 * r), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("nail clipper")
@@ -287,4 +293,6 @@ def nail_clipper(*, length_m: float, width: float, thick_m: float, lever: float)
     model.cut("hole", cylinder(0.0016, 0.1, sides=24).translate((-end + 0.0045, 0, -0.05)))
     model.point("jaws", "edge", "jaws", (end, 0.0, 0.0006), (1.0, 0.0, 0.0))
     at = curve[19]
-    return model.point("lever", "surface", "lever", (float(at[0]), 0.0, float(at[2]) + 0.0009), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "lever", "surface", "lever", (float(at[0]), 0.0, float(at[2]) + 0.0009), (0.0, 0.0, 1.0)
+    ).rest_on_ground()

@@ -22,8 +22,8 @@ from manitwin.geometry.solids.shapes import (
 )
 from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.catalog.hand_tools import grip
-from manitwin.models.generators.templates.catalog.rings import ring_radii, with_both_sides
-from manitwin.models.generators.templates.catalog.vessel import bulge
+from manitwin.models.generators.templates.catalog.rings import finish_ring, ring_radii
+from manitwin.models.generators.templates.catalog.vessel import smooth_profile
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -66,7 +66,7 @@ def stacking_ring(*, width_m: float, hole: float) -> Model:
     """Build a lying ring; ``hole`` is the hole's width relative to the ring's."""
     ring, half = ring_radii(width_m, hole)
     model = Model().add("body", torus(ring, half, sides=chords(64)))
-    return with_both_sides(model, width_m, hole, hole_share=0.7)
+    return finish_ring(model, width_m, hole, hole_share=0.7)
 
 
 @template("yo yo")
@@ -83,7 +83,7 @@ def yo_yo(*, width_m: float, thick: float, gap: float) -> Model:
     cap = cylinder(0.32 * r, 0.06 * h).translate((0, 0, 0.95 * h))
     model.add("cap", cap, "axle")
     model.point("top", "face", "cap", (0.0, 0.0, 1.01 * h), (0.0, 0.0, 1.0))
-    return model.point("end", "surface", "end", (0.0, -0.98 * r, 0.5 * low), (0.0, -1.0, 0.0)).laid()
+    return model.point("end", "surface", "end", (0.0, -0.98 * r, 0.5 * low), (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 @template("rubik's cube")
@@ -109,7 +109,7 @@ def rubiks_cube(*, width_m: float, sticker: float, gap_m: float) -> Model:
         model.add(side_name, face.rotate(turn), side_name)
     model.point("top", "face", "up", (0.0, 0.0, half + raised), (0.0, 0.0, 1.0))
     model.point("side", "face", "front", (0.0, -half - raised, 0.0), (0.0, -1.0, 0.0))
-    return model.laid()
+    return model.rest_on_ground()
 
 
 @template("domino")
@@ -150,7 +150,7 @@ def chess_piece(*, height_m: float, width: float, head: float, waist: float) -> 
         "body",
         (0.0, -float(np.interp(0.4, [0.25, 0.5], [0.62 * r, thin])), 0.4 * h),
         (0.0, -1.0, 0.0),
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("toy car")
@@ -205,7 +205,7 @@ def toy_car(*, length_m: float, width: float, height: float, cabin: float, wheel
         bar = box(1.7 * x, 0.03 * n, 0.045 * n, radius_m=0.01 * n).translate((0, 0.5 * n * sign, low + 0.01 * n))
         model.add("bumper", bar, "hubs")
     model.point("front", "surface", "bumper", (0.0, -0.515 * n, low + 0.0325 * n), (0.0, -1.0, 0.0))
-    return model.point("roof", "surface", "cabin", (0.0, 0.02 * n, h), (0.0, 0.0, 1.0)).laid()
+    return model.point("roof", "surface", "cabin", (0.0, 0.02 * n, h), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("bowling pin")
@@ -215,7 +215,7 @@ def bowling_pin(*, height_m: float, width: float, neck: float, head: float) -> M
     side = [(0.47 * r, 0.0), (0.86 * r, 0.15 * h), (r, 0.3 * h), (0.76 * r, 0.5 * h), (neck * r, 0.68 * h)]
     crown = np.linspace(0.0, 0.5 * np.pi, 6)
     ball = 1.0 - head * r / h  # where the head is widest, with a round upper half
-    profile = bulge([*side, (head * r, ball * h)], rows=12)
+    profile = smooth_profile([*side, (head * r, ball * h)], rows=12)
     profile += [(head * r * float(np.cos(a)), (ball + (1 - ball) * float(np.sin(a))) * h) for a in crown[1:]]
     model = Model().add("body", lathe(profile))
     levels = np.linspace(0.64, 0.73, 7) * h
@@ -246,7 +246,7 @@ def table_tennis_paddle(*, length_m: float, blade: float, width: float, thick_m:
     top = 0.5 * thick_m + 0.0018
     model.point("forehand", "face", "forehand", (at, 0.0, top), (0.0, 0.0, 1.0))
     model.point("handle", "surface", "handle", (0.5 * (start + end), 0.0, 0.0119), (0.0, 0.0, 1.0))
-    return model.laid()
+    return model.rest_on_ground()
 
 
 @template("rubber duck")

@@ -7,7 +7,14 @@ from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import chords, cylinder, lathe
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.organic import furrow, leaves, lying, ribbed, stalk, turned
+from manitwin.models.generators.templates.catalog.organic import (
+    furrow,
+    lay_along_x,
+    leaves,
+    scale_radially,
+    smooth_revolution,
+    stalk,
+)
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -16,12 +23,14 @@ def plum(*, length_m: float, width: float, cleft: float) -> Model:
     """Build a lying plum with the stem cavity towards +X and a shallow cleft along its upper side."""
     wide = width * length_m
     profile = [(0, 0.0), (0.2, 0.008), (0.58, 0.08), (0.88, 0.25), (1, 0.48), (0.93, 0.72), (0.68, 0.91), (0.4, 0.985)]
-    body = turned([*profile, (0.24, 0.985), (0.08, 0.945), (0, 0.94)], wide, length_m, sides=80)
-    laid = lying(ribbed(body, furrow(cleft, 0.12, np.pi)).translate((0, 0, -0.5 * length_m)))
-    scar = lying(cylinder(0.06 * wide, 0.03 * length_m, sides=chords(14))).translate((0.42 * length_m, 0, 0))
+    body = smooth_revolution([*profile, (0.24, 0.985), (0.08, 0.945), (0, 0.94)], wide, length_m, sides=80)
+    laid = lay_along_x(scale_radially(body, furrow(cleft, 0.12, np.pi)).translate((0, 0, -0.5 * length_m)))
+    scar = lay_along_x(cylinder(0.06 * wide, 0.03 * length_m, sides=chords(14))).translate((0.42 * length_m, 0, 0))
     model = Model().add("body", laid).add("stem", scar, "stem")
     model.point("upper side", "surface", "body", (0.0, 0.12 * wide, 0.485 * wide), (0.0, 0.25, 0.968))
-    return model.point("side", "surface", "body", (-0.02 * length_m, -0.5 * wide, 0.0), (0.0, -1.0, 0.0)).laid()
+    return model.point(
+        "side", "surface", "body", (-0.02 * length_m, -0.5 * wide, 0.0), (0.0, -1.0, 0.0)
+    ).rest_on_ground()
 
 
 @template("avocado")
@@ -33,16 +42,16 @@ def avocado(*, length_m: float, width: float, neck: float) -> Model:
     tilt = _resting_tilt(np.array(profile) * [0.5 * wide, length_m])
 
     def laid(solid: Manifold) -> Manifold:
-        return lying(solid.translate((0, 0, -0.5 * length_m))).rotate((0, float(np.degrees(tilt)), 0))
+        return lay_along_x(solid.translate((0, 0, -0.5 * length_m))).rotate((0, float(np.degrees(tilt)), 0))
 
-    model = Model().add("body", laid(turned(profile, wide, length_m, sides=56)))
+    model = Model().add("body", laid(smooth_revolution(profile, wide, length_m, sides=56)))
     nub = cylinder(0.07 * wide, 0.04 * length_m, top_radius_m=0.085 * wide, sides=chords(16))
     model.add("stem", laid(nub.translate((0, 0, 0.975 * length_m))), "stem")
     ahead = (float(np.cos(tilt)), 0.0, -float(np.sin(tilt)))
     end, broad = 0.515 * length_m, -0.12 * length_m
     model.point("stem end", "tip", "stem", (end * ahead[0], 0.0, end * ahead[2]), ahead)
     place = (broad * ahead[0], -0.5 * wide, broad * ahead[2])
-    return model.point("side", "surface", "body", place, (0.0, -1.0, 0.0)).laid()
+    return model.point("side", "surface", "body", place, (0.0, -1.0, 0.0)).rest_on_ground()
 
 
 def _resting_tilt(profile_m: np.ndarray) -> float:
@@ -77,7 +86,7 @@ def cucumber(*, length_m: float, width: float, bend: float) -> Model:
     model.point("stem", "tip", "stem", end, (0.95, 0.31, 0.0))
     model.point("body", "surface", "body", (0.0, 0.0, r), (0.0, 0.0, 1.0))
     tip = (-0.5 * length_m, float(path[0, 1]), 0.0)
-    return model.point("tip", "tip", "tip", tip, (-1.0, 0.0, 0.0)).laid()
+    return model.point("tip", "tip", "tip", tip, (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("corn")
@@ -97,17 +106,17 @@ def corn(*, length_m: float, width: float, rows: float, husk: float) -> Model:
         return np.column_stack([vertices[:, :2] * scale[:, None], z])
 
     ear = lathe(np.column_stack([radii, levels * length_m]), sides=chords(8 * around)).warp_batch(grained)
-    model = Model().add("body", lying(ear.translate((0, 0, -0.5 * length_m))))
+    model = Model().add("body", lay_along_x(ear.translate((0, 0, -0.5 * length_m))))
     model.region("tip", "body", lambda c: c[:, 0] < -0.45 * length_m)
     end = 0.5 * length_m
     long = husk * length_m
     outline = [(0.0, 0.012), (0.7 * r, 0.004), (1.0 * r, -0.25 * long), (1.04 * r, -0.6 * long), (1.22 * r, -long)]
-    model.add("husk", lying(leaves(7, outline, 0.5 * r, 0.0018)).translate((end, 0, 0)), "husk")
+    model.add("husk", lay_along_x(leaves(7, outline, 0.5 * r, 0.0018)).translate((end, 0, 0)), "husk")
     stem = arc([(end - 0.01, 0, 0), (end + 0.09 * length_m, 0, 0)], samples=4)
     model.add("stem", tube(stem, np.linspace(0.36 * r, 0.28 * r, 4), sides=16), "husk")
     model.point("stem", "tip", "stem", (end + 0.09 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0))
     model.point("body", "surface", "body", (-0.1 * length_m, 0.0, 0.97 * r), (0.0, 0.0, 1.0))
-    return model.point("tip", "tip", "tip", (-0.5 * length_m, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
+    return model.point("tip", "tip", "tip", (-0.5 * length_m, 0.0, 0.0), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 @template("bell pepper")
@@ -115,9 +124,9 @@ def bell_pepper(*, width_m: float, tall: float, ribs: float, stem_m: float) -> M
     """Build a bell pepper standing on its four lobes with its stem up; ``ribs`` is the depth of its furrows."""
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.09), (0.2, 0.05), (0.45, 0.0), (0.74, 0.07), (0.87, 0.28), (0.96, 0.58), (1, 0.76), (0.9, 0.94)]
-    body = turned([*profile, (0.66, 1.0), (0.36, 0.955), (0.14, 0.86), (0, 0.84)], width_m, h, sides=96)
+    body = smooth_revolution([*profile, (0.66, 1.0), (0.36, 0.955), (0.14, 0.86), (0, 0.84)], width_m, h, sides=96)
     model = Model().add(
-        "body", ribbed(body, lambda a: 1 - ribs * (1 - np.abs(np.sin(2 * a)) ** 0.6) + 0.03 * np.sin(a))
+        "body", scale_radially(body, lambda a: 1 - ribs * (1 - np.abs(np.sin(2 * a)) ** 0.6) + 0.03 * np.sin(a))
     )
     top = (0.14 * r, 0.0, 0.84 * h + stem_m)
     path = arc([(0, 0, 0.8 * h), (0, 0, 0.9 * h), (0.05 * r, 0, 0.9 * h + 0.5 * stem_m), top], samples=12)
@@ -126,4 +135,6 @@ def bell_pepper(*, width_m: float, tall: float, ribs: float, stem_m: float) -> M
     model.point("stem end", "tip", "stem", top, (0.3, 0.0, 0.954))
     turn = np.radians(-45)
     side = (0.985 * r * float(np.cos(turn)), 0.985 * r * float(np.sin(turn)), 0.72 * h)
-    return model.point("side", "surface", "body", side, (float(np.cos(turn)), float(np.sin(turn)), 0.0)).laid()
+    return model.point(
+        "side", "surface", "body", side, (float(np.cos(turn)), float(np.sin(turn)), 0.0)
+    ).rest_on_ground()

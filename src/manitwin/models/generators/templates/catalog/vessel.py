@@ -24,15 +24,15 @@ def shell(profile: list[Point], wall_m: float, floor_m: float) -> tuple[Manifold
     return lathe(profile), lathe([*corner, *wall[4:], (wall[-1][0], float(z[-1]) + 2 * wall_m)])
 
 
-def hollowed(
+def assemble_from_profile(
     model: Model, profile: list[Point], wall_m: float, floor_m: float, *handles: tuple[str, Manifold]
 ) -> Model:
-    """Assemble a vessel from a profile, as ``put_together`` does."""
+    """Assemble a vessel from a profile, as ``assemble_vessel`` does."""
     outer, inner = shell(profile, wall_m, floor_m)
-    return put_together(model, outer, inner, profile[-1][1], profile[0][0], *handles)
+    return assemble_vessel(model, outer, inner, profile[-1][1], profile[0][0], *handles)
 
 
-def put_together(
+def assemble_vessel(
     model: Model, outer: Manifold, inner: Manifold, height_m: float, foot_m: float, *handles: tuple[str, Manifold]
 ) -> Model:
     """Assemble a vessel: a ``body`` with ``handles``, hollowed at its ``inside``, with its upper edge as ``rim``.
@@ -82,7 +82,7 @@ def stick(
     return "handle", tube(path, half_m, flatten=0.65)
 
 
-def bulge(points: list[Point], *, rows: int = 20) -> list[Point]:
+def smooth_profile(points: list[Point], *, rows: int = 20) -> list[Point]:
     """Return a smooth profile through (radius, z) points from bottom to top: a Catmull-Rom spline with positive radii."""
     curve = arc([(radius, 0.0, z) for radius, z in points], samples=rows)
     return [(max(float(radius), 1e-4), float(z)) for radius, _, z in curve]

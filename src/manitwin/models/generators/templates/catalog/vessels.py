@@ -9,7 +9,13 @@ import numpy as np
 from manitwin.geometry.solids.shapes import box, cylinder, lathe, polygon, prism, rounded
 from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.catalog.cup_shapes import EAR_SHARE, HIGHEST_JOIN, CupSide, cup_ear
-from manitwin.models.generators.templates.catalog.vessel import RIM_SHARE, bulge, ear, hollowed, shell
+from manitwin.models.generators.templates.catalog.vessel import (
+    RIM_SHARE,
+    assemble_from_profile,
+    ear,
+    shell,
+    smooth_profile,
+)
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -18,7 +24,7 @@ def mug(*, height_m: float, width: float, wall_m: float, taper: float, handle: f
     """Build a mug; ``width`` and ``handle`` are relative to the height, ``taper`` is the foot's radius relative to the rim's."""
     model, radius = Model(), 0.5 * width * height_m
     profile = rounded([(0.8 * taper * radius, 0), (taper * radius, 0.03 * height_m), (radius, height_m)], 0.008)
-    return hollowed(
+    return assemble_from_profile(
         model,
         profile,
         wall_m,
@@ -32,7 +38,7 @@ def cup(*, height_m: float, width: float, wall_m: float, taper: float) -> Model:
     """Build a cup without a handle."""
     radius = 0.5 * width * height_m
     profile = rounded([(0.92 * taper * radius, 0), (taper * radius, 0.03 * height_m), (radius, height_m)], 0.004)
-    return hollowed(Model(), profile, wall_m, 1.5 * wall_m)
+    return assemble_from_profile(Model(), profile, wall_m, 1.5 * wall_m)
 
 
 @template("glass")
@@ -40,7 +46,7 @@ def glass(*, height_m: float, width: float, wall_m: float, taper: float) -> Mode
     """Build a tumbler with a thick floor."""
     radius = 0.5 * width * height_m
     profile = rounded([(0.9 * taper * radius, 0), (taper * radius, 0.03 * height_m), (radius, height_m)], 0.004)
-    return hollowed(Model(), profile, wall_m, 4 * wall_m)
+    return assemble_from_profile(Model(), profile, wall_m, 4 * wall_m)
 
 
 @template("wine glass")
@@ -48,7 +54,7 @@ def wine_glass(*, height_m: float, width: float, stem: float, wall_m: float, foo
     """Build a wine glass; ``stem`` is the share of its height below the bowl, ``foot`` the foot's width over the bowl's."""
     model, h, r = Model(), height_m, 0.5 * width * height_m
     low = stem * h
-    bowl = bulge(
+    bowl = smooth_profile(
         [(0.004, low), (0.6 * r, low + 0.06 * h), (r, low + 0.22 * h), (0.95 * r, low + 0.38 * h), (0.76 * r, h)]
     )
     outer, inner = shell(bowl, wall_m, 0.012)
@@ -72,7 +78,7 @@ def bowl(*, width_m: float, height: float, wall_m: float, foot: float) -> Model:
     turn = np.linspace(0.0, np.pi / 2, 12)
     side = zip(radius * (foot + (1 - foot) * np.sin(turn)), high * (0.06 + 0.94 * (1 - np.cos(turn))), strict=True)
     profile = [(foot * radius, 0.0), *((float(r), float(z)) for r, z in side)]
-    return hollowed(Model(), profile, wall_m, 0.06 * high + wall_m)
+    return assemble_from_profile(Model(), profile, wall_m, 0.06 * high + wall_m)
 
 
 @template("pet bowl")
@@ -100,7 +106,7 @@ def plate(*, width_m: float, height: float, wall_m: float, well: float) -> Model
     """Build a plate or a saucer; ``well`` is the flat share of its radius."""
     radius, high = 0.5 * width_m, height * width_m
     profile = rounded([(well * radius, 0.0), ((well + 0.11) * radius, 0.25 * high), (radius, high)], 0.012)
-    return hollowed(Model(), profile, wall_m, wall_m)
+    return assemble_from_profile(Model(), profile, wall_m, wall_m)
 
 
 @template("cup and saucer")
@@ -128,7 +134,7 @@ def cup_and_saucer(
     foot, height, up = taper * radius, rim * cup * width_m, saucer * width_m
     floor = wall_m + 0.0005
     well = 1.15 * foot
-    dish_side = bulge(
+    dish_side = smooth_profile(
         [(well, 0.0), (0.6 * well + 0.4 * dish, 0.28 * up), (0.25 * well + 0.75 * dish, 0.64 * up), (dish, up)]
     )
     under, hollow = shell(dish_side, wall_m, floor + 0.0005)
@@ -156,7 +162,9 @@ def cup_and_saucer(
 def pitcher(*, height_m: float, width: float, wall_m: float, neck: float, spout: float) -> Model:
     """Build a jug with a handle towards +X and a spout towards -X."""
     model, h, r = Model(), height_m, 0.5 * width * height_m
-    profile = bulge([(0.8 * r, 0), (0.98 * r, 0.18 * h), (r, 0.38 * h), (neck * r, 0.8 * h), (0.95 * neck * r, h)])
+    profile = smooth_profile(
+        [(0.8 * r, 0), (0.98 * r, 0.18 * h), (r, 0.38 * h), (neck * r, 0.8 * h), (0.95 * neck * r, h)]
+    )
     profile = [(0.7 * r, 0.0), *profile[1:]]
     lip_x = 0.95 * neck * r + spout * h
     outline = [(-0.3 * r, -0.42 * r), (-lip_x, -0.05 * r), (-lip_x, 0.05 * r), (-0.3 * r, 0.42 * r)]
@@ -181,7 +189,7 @@ def pitcher(*, height_m: float, width: float, wall_m: float, neck: float, spout:
 def teapot(*, height_m: float, width: float, spout: float, wall_m: float) -> Model:
     """Build a round teapot with its lid on; the spout towards -X protrudes by ``spout`` of the height."""
     model, h, r = Model(), 0.82 * height_m, 0.5 * width * height_m * 0.8
-    profile = bulge([(0.6 * r, 0), (0.95 * r, 0.25 * h), (r, 0.5 * h), (0.8 * r, 0.82 * h), (0.45 * r, h)])
+    profile = smooth_profile([(0.6 * r, 0), (0.95 * r, 0.25 * h), (r, 0.5 * h), (0.8 * r, 0.82 * h), (0.45 * r, h)])
     reach = r + spout * height_m
     path = arc([(-0.7 * r, 0, 0.3 * h), (-1.15 * r, 0, 0.42 * h), (-0.85 * reach, 0, 0.8 * h), (-reach, 0, 1.02 * h)])
     thick = np.linspace(0.24 * r, 0.115 * r, len(path))
@@ -230,6 +238,6 @@ def measuring_cup(*, height_m: float, width: float, wall_m: float, handle: float
     )
     grip = ear(model, 0.98 * radius, 0.88 * height_m, 0.25 * height_m, handle * height_m, 0.011)
     model.point("spout", "tip", "spout", (-1.17 * radius, 0.0, height_m), (-1.0, 0.0, 0.0))
-    model = hollowed(model, profile, wall_m, 1.5 * wall_m, grip, ("spout", lip))
+    model = assemble_from_profile(model, profile, wall_m, 1.5 * wall_m, grip, ("spout", lip))
     groove = cylinder(0.25 * radius - wall_m, 0.2 * height_m, top_radius_m=0.39 * radius - wall_m)
     return model.cut("inside", groove.translate((-0.85 * radius, 0, 0.91 * height_m)))

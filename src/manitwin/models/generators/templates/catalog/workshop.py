@@ -40,7 +40,7 @@ def tape_measure(*, length_m: float, height: float, thick: float) -> Model:
     ahead, up = float(np.sin(np.radians(58))), float(np.cos(np.radians(58)))
     place = (0.85 * end + 0.009 * ahead, 0.0, 0.64 * high + 0.009 * up)
     model.point("lock", "button", "lock", place, (ahead, 0.0, up))
-    return model.point("body", "surface", "body", (-0.3 * length_m, 0.0, high), (0.0, 0.0, 1.0)).laid()
+    return model.point("body", "surface", "body", (-0.3 * length_m, 0.0, high), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("spirit level")
@@ -68,7 +68,7 @@ def spirit_level(*, length_m: float, height_m: float, thick: float) -> Model:
     model.point("measuring face", "face", "body", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
     return model.point(
         "plumb vial", "surface", "plumb vial", (0.36 * length_m, -bore, 0.5 * high), (0.0, -1.0, 0.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("magnet")
@@ -84,7 +84,7 @@ def magnet(*, length_m: float, width: float, thick: float) -> Model:
         y = side * 0.5 * (r + inner)
         model.add("poles", tip.translate((end - 0.5 * cap - 0.0005, y, 0)), "poles")
         model.point("pole", "face", "poles", (end, y, 0.5 * deep), (1.0, 0.0, 0.0))
-    return model.point("bow", "surface", "body", (-end, 0.0, 0.5 * deep), (-1.0, 0.0, 0.0)).laid()
+    return model.point("bow", "surface", "body", (-end, 0.0, 0.5 * deep), (-1.0, 0.0, 0.0)).rest_on_ground()
 
 
 def _round(radius_m: float, x_m: float) -> np.ndarray:
@@ -122,7 +122,9 @@ def hand_rake(*, length_m: float, head: float, width_m: float) -> Model:
     model.point("tines", "tip", "tines", (float(tip[0]), 0.0, float(tip[2])), (0.0, 0.0, -1.0))
     middle = 0.5 * (start - 0.5 * length_m)
     place = (middle * np.cos(lean) - 0.014 * np.sin(lean), 0.0, middle * np.sin(lean) + 0.014 * np.cos(lean))
-    return model.point("handle", "surface", "handle", (float(place[0]), 0.0, float(place[2])), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (float(place[0]), 0.0, float(place[2])), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("paint roller")
@@ -152,7 +154,9 @@ def paint_roller(*, length_m: float, width_m: float, roll_m: float, handle: floa
     model.cut("bore", cylinder(0.6 * r, 0.012).rotate((90, 0, 0)).translate((at, 0.5 * width_m + 0.004, 0)), "cap")
     model.add("handle", grip(tail, stop, 0.0145, flatten=0.9, swell=0.1).translate((0, 0, low)), "handle")
     model.point("roller", "surface", "roller", (at, 0.0, r), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (0.5 * (tail + stop), 0.0, low + 0.0143), (0.0, 0.0, 1.0)).laid()
+    return model.point(
+        "handle", "surface", "handle", (0.5 * (tail + stop), 0.0, low + 0.0143), (0.0, 0.0, 1.0)
+    ).rest_on_ground()
 
 
 @template("squeegee")
@@ -172,7 +176,7 @@ def squeegee(*, length_m: float, width: float, handle_m: float) -> Model:
     x = -end + along * (2 * end - 0.04)
     model.add("handle", tube(np.stack([x, 0 * x, 0 * x], 1), half, flatten=0.85), "handle")
     model.point("front edge", "edge", "edge", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("handle", "surface", "handle", (-0.5 * end, 0.0, 0.85 * r), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (-0.5 * end, 0.0, 0.85 * r), (0.0, 0.0, 1.0)).rest_on_ground()
 
 
 @template("magnifying glass")
@@ -200,7 +204,7 @@ def magnifying_glass(*, length_m: float, lens: float, thick_m: float) -> Model:
     middle = 0.5 * (start - 0.012 - end)
     return model.point(
         "handle", "surface", "handle", (middle, 0.0, max(0.0075, 0.62 * thick_m)), (0.0, 0.0, 1.0)
-    ).laid()
+    ).rest_on_ground()
 
 
 @template("mallet")
@@ -218,4 +222,4 @@ def mallet(*, length_m: float, head: float, face_m: float, handle_m: float) -> M
         model.point("striking face", "face", name, (at, side * 0.5 * across, 0.0), (0.0, side, 0.0))
     model.add("handle", grip(-0.5 * length_m, at, 0.5 * handle_m, flatten=0.85, swell=0.05), "handle")
     middle = 0.5 * (-0.5 * length_m + at - 0.5 * face_m)
-    return model.point("handle", "surface", "handle", (middle, 0.0, 0.445 * handle_m), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (middle, 0.0, 0.445 * handle_m), (0.0, 0.0, 1.0)).rest_on_ground()

@@ -70,7 +70,7 @@ def silhouette(pixels: np.ndarray, faces: np.ndarray, edges: tuple[np.ndarray, n
     return mask
 
 
-def seen_faces(pixels: np.ndarray, distance: np.ndarray, faces: np.ndarray, side_px: int) -> np.ndarray:
+def visible_faces(pixels: np.ndarray, distance: np.ndarray, faces: np.ndarray, side_px: int) -> np.ndarray:
     """Return the visible face at each pixel, ``(side, side) int32``, -1 for background."""
     picture = np.full((side_px, side_px), -1, np.int32)
     front = np.nonzero(facing(pixels, faces))[0]

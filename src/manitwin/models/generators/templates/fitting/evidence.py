@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 SIDE_PX = 112
-FINE = 2
+OVERSAMPLING = 2
 """Oversampling of silhouettes relative to colours, so that the fit resolves differences of less than a pixel."""
 BOX_SHARE = 0.82
 """Share of the image that the object's box fills; the margin shows a solid that is larger than the photo's object."""
@@ -52,14 +52,14 @@ class Evidence:
     center_px: tuple[float, float]
     box_px: float
 
-    def compared_with(self, *, perforated: bool) -> Evidence:
+    def for_comparison(self, *, perforated: bool) -> Evidence:
         """Return the evidence to compare a solid with; a perforated solid is drawn without small holes, so they are filled here
         too.
         """
         return replace(self, mask=self.filled_mask, outline=self.filled_outline) if perforated else self
 
 
-def evidence_of(rgba: np.ndarray, focal_mm: float | None = None) -> Evidence:
+def extract_evidence(rgba: np.ndarray, focal_mm: float | None = None) -> Evidence:
     """Return the evidence of ``rgba (H, W, 4) uint8`` with the object's mask as alpha; ``focal_mm`` is 35 mm equivalent, if
     known.
     """
@@ -68,17 +68,17 @@ def evidence_of(rgba: np.ndarray, focal_mm: float | None = None) -> Evidence:
     height, width = float(rows[-1] - rows[0] + 1), float(columns[-1] - columns[0] + 1)
     center = ((columns[0] + columns[-1]) / 2, (rows[0] + rows[-1]) / 2)
     box_px = max(height, width)
-    fine = _crop(rgba, center, box_px, FINE * SIDE_PX)
+    fine = _crop(rgba, center, box_px, OVERSAMPLING * SIDE_PX)
     small = np.asarray(cv2.resize(fine, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA))
     whole, mask = _largest(fine[..., 3] > 127.5), _largest(small[..., 3] > 127.5)
     lab = np.asarray(cv2.cvtColor(np.ascontiguousarray(small[..., :3] / 255), cv2.COLOR_RGB2Lab))
     depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
     focal_px = (focal_mm or TYPICAL_FOCAL_MM) / _DIAGONAL_35MM * float(np.hypot(*rgba.shape[:2]))
-    outline, filled = signed_distance(whole), without_small_holes(whole)
+    outline, filled = signed_distance(whole), fill_small_holes(whole)
     return Evidence(
         mask=mask,
         outline=outline,
-        filled_mask=without_small_holes(mask),
+        filled_mask=fill_small_holes(mask),
         filled_outline=outline if filled is whole else signed_distance(filled),
         edge=_edges(lab, depth > _RIM_PX),
         lab=lab,
@@ -95,7 +95,7 @@ def signed_distance(mask: np.ndarray) -> np.ndarray:
 
     It is computed only near the mask's box; pixels farther away are -1.
     """
-    step, reach = 2 * FINE, REACH * mask.shape[0]
+    step, reach = 2 * OVERSAMPLING, REACH * mask.shape[0]
     found = np.full([len(range(1, side, step)) for side in mask.shape], -1.0, np.float32)
     inside = mask.astype(np.uint8)
     left, top, width, height = cv2.boundingRect(inside)
@@ -112,7 +112,7 @@ def signed_distance(mask: np.ndarray) -> np.ndarray:
     return found
 
 
-def without_small_holes(mask: np.ndarray) -> np.ndarray:
+def fill_small_holes(mask: np.ndarray) -> np.ndarray:
     """Return a mask ``(H, W) bool`` with holes of up to ``LARGEST_PERFORATION`` of its area filled; the mask itself if it has
     none.
     """

@@ -8,23 +8,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.geometry.solids.shapes import SolidError
-from manitwin.models.annotators.prior_names import found_by, lookup, named
+from manitwin.models.annotators.prior_names import find_prior, found_by, named
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.described import is_described
-from manitwin.models.generators.templates.fitting.evidence import Evidence, evidence_of
-from manitwin.models.generators.templates.fitting.least_squares import Placed
+from manitwin.models.generators.templates.fitting.evidence import Evidence, extract_evidence
+from manitwin.models.generators.templates.fitting.least_squares import PlacedView
 from manitwin.models.generators.templates.fitting.residual import Residual
 from manitwin.models.generators.templates.fitting.search import Candidate, search
-from manitwin.models.generators.templates.fitting.shape import Family
+from manitwin.models.generators.templates.fitting.shape import ShapeFamily
 from manitwin.models.generators.templates.fitting.view import View
+from manitwin.models.generators.templates.look_phrases import is_descriptive
 from manitwin.models.generators.templates.looks import Look, look_of
-from manitwin.models.generators.templates.made import Made
-from manitwin.models.generators.templates.making import dressed
 from manitwin.models.generators.templates.named_category import is_adjective
+from manitwin.models.generators.templates.object_sampling import assemble_object
 from manitwin.models.generators.templates.other_shapes import KIN_OF_ANOTHER_SHAPE
 from manitwin.models.generators.templates.template import Template
+from manitwin.models.generators.templates.template_object import TemplateObject
 from manitwin.models.generators.templates.vocabulary import FILLER_WORDS
 
 _MOST_KINDS, _SIZE_MARGIN = 8, 1.5
@@ -41,7 +41,7 @@ by 8 %.
 
 
 @dataclass(frozen=True)
-class Fitted:
+class TemplateFit:
     """A template with the measures and view that explain a photo best.
 
     ``made`` is the solid with its parts in the object frame. A photo does not determine the size: the longest side is the typical
@@ -50,7 +50,7 @@ class Fitted:
     """
 
     category: str
-    made: Made
+    made: TemplateObject
     view: View
     residual: Residual
     upright: bool
@@ -74,14 +74,14 @@ def template_for(name: str | None) -> Template | None:
     for first in range(max(len(each) - 1, 1)):
         if (last_words := " ".join(each[first:])) in by_name:
             return by_name[last_words]
-    prior = named(words) or lookup(words)
+    prior = named(words) or find_prior(words)
     if prior is None:
         return None
     beside = prior.kin_of if prior.vessel and prior.category not in KIN_OF_ANOTHER_SHAPE else None
     return by_name.get(prior.category) or templates.get(beside or "")
 
 
-def kinds_of(category: str, name: str | None = None) -> list[str]:
+def alternative_categories(category: str, name: str | None = None) -> list[str]:
     """Return the other categories that a category's name may mean: a can may be a drink can, a water bottle a bottle.
 
     Candidates share its last word, or are its kin in the priors (mallet and hammer), and have a similar size: a watering can is
@@ -91,42 +91,42 @@ def kinds_of(category: str, name: str | None = None) -> list[str]:
     bulb box, has no alternatives.
     """
     templates, last = load_templates(), category.split()[-1]
-    said = lookup(category)
-    if said is not None and said.shape == "box-shaped" and _says_contents(name):
+    said = find_prior(category)
+    if said is not None and said.shape == "box-shaped" and _has_stated_contents(name):
         return []
     if category != last:
         kinds = [last] if last in templates else []
     else:
-        kinds = [other for other in templates if other != category and last in _heads(templates[other])]
+        kinds = [other for other in templates if other != category and last in _head_nouns(templates[other])]
         kinds = [other for other in kinds if not templates[other].told_in_full]
         kinds = [other for other in kinds if said is not None and load_priors()[other].container == said.container]
-    told_apart = _says_which(name, category)
+    told_apart = _is_more_specific(name, category)
     beside = [other for other in templates if load_priors()[other].kin_of == category and not told_apart]
     kinds += [other for other in beside if other not in kinds and not templates[other].told_in_full]
-    return [other for other in kinds if said is not None and _about_as_large(lookup(other), said)][:_MOST_KINDS]
+    return [other for other in kinds if said is not None and _has_similar_size(find_prior(other), said)][:_MOST_KINDS]
 
 
-def _says_which(name: str | None, category: str) -> bool:
+def _is_more_specific(name: str | None, category: str) -> bool:
     """Return whether a name is more specific than the category: a claw hammer."""
     found = found_by(name)
     return found is not None and found[1].endswith(f" {category}")
 
 
-def _says_contents(name: str | None) -> bool:
+def _has_stated_contents(name: str | None) -> bool:
     """Return whether a name states contents, by a noun before the known name or by 'of': a spark plug box."""
     found, words = found_by(name), (name or "").lower().replace("_", " ").replace("-", " ").split()
     if found is None:
         return False
     others = [word for word in words if word not in (*found[1].split(), *FILLER_WORDS)]
-    return "of" in words or any(not is_described(word) and not is_adjective(word) for word in others)
+    return "of" in words or any(not is_descriptive(word) and not is_adjective(word) for word in others)
 
 
-def _heads(template: Template) -> set[str]:
+def _head_nouns(template: Template) -> set[str]:
     """Return the head nouns of a template's names, ignoring accessories after 'and' or 'with'."""
     return {name.split(" and ")[0].split(" with ")[0].split()[-1] for name in (template.category, *template.names)}
 
 
-def _about_as_large(one: Prior | None, other: Prior) -> bool:
+def _has_similar_size(one: Prior | None, other: Prior) -> bool:
     low, high = other.longest_axis_m.low / _SIZE_MARGIN, other.longest_axis_m.high * _SIZE_MARGIN
     return one is not None and low <= one.longest_axis_m.typical <= high
 
@@ -138,7 +138,7 @@ def fit(
     *,
     or_of: Sequence[str] = (),
     focal_mm: float | None = None,
-) -> Fitted | None:
+) -> TemplateFit | None:
     """Fit the template of a category to ``rgba (H, W, 4) uint8`` with the object's mask as alpha.
 
     ``initial_measures`` replace the typical values as prior mean. ``or_of`` are alternative categories, chosen if they explain
@@ -147,29 +147,29 @@ def fit(
     solid. Raises KeyError for a category without a template.
     """
     templates = load_templates()
-    evidence = evidence_of(rgba, focal_mm)
-    families = [Family(templates[category], initial_measures), *(Family(templates[other]) for other in or_of)]
-    nearest = first_built(search(families, evidence, settled=True), evidence)
+    evidence = extract_evidence(rgba, focal_mm)
+    families = [ShapeFamily(templates[category], initial_measures), *(ShapeFamily(templates[other]) for other in or_of)]
+    nearest = first_solid_fit(search(families, evidence, settled=True), evidence)
     if nearest is None or nearest.category == category or nearest.confidence >= LEAST_CONFIDENCE:
         return nearest
-    alone = first_built(search([Family(templates[nearest.category])], evidence, settled=True), evidence)
+    alone = first_solid_fit(search([ShapeFamily(templates[nearest.category])], evidence, settled=True), evidence)
     return alone if alone is not None and alone.residual.cost < nearest.residual.cost else nearest
 
 
-def first_built(candidates: Iterable[Candidate], evidence: Evidence) -> Fitted | None:
+def first_solid_fit(candidates: Iterable[Candidate], evidence: Evidence) -> TemplateFit | None:
     """Return the first candidate whose measures give a solid, as a fit of the photo; None if there is none."""
     for best in candidates:
         try:
-            made = made_of(best.family.template, best.family.measures(best.spreads))
+            made = build_fitted_object(best.family.template, best.family.measures(best.spreads))
         except SolidError:
             continue
-        return fitted(made, Placed(best.view, best.upright), best.residual, evidence)
+        return assemble_fit(made, PlacedView(best.view, best.upright), best.residual, evidence)
     return None
 
 
-def fitted(made: Made, placed: Placed, left: Residual, evidence: Evidence) -> Fitted:
+def assemble_fit(made: TemplateObject, placed: PlacedView, left: Residual, evidence: Evidence) -> TemplateFit:
     """Return the fit of one photo."""
-    return Fitted(
+    return TemplateFit(
         category=made.category,
         made=made,
         view=placed.view,
@@ -187,14 +187,14 @@ def confidence_of(residual: Residual) -> float:
     return float(1 / (1 + np.exp(-score)))
 
 
-def made_of(template: Template, measures: dict[str, float]) -> Made:
+def build_fitted_object(template: Template, measures: dict[str, float]) -> TemplateObject:
     """Return a template with these measures and its first looks, scaled to the typical longest side of its category."""
     looks: dict[str, Look] = {}
     for slot, choices in template.slots.items():
         looks[slot] = look_of(choices[0]) if choices[0] else looks[next(iter(template.slots))]
     model = template.build(**measures)
     mesh = model.assembly.mesh()
-    prior = lookup(template.category)
+    prior = find_prior(template.category)
     assert prior is not None, template.category
     scale = prior.longest_axis_m.typical / float(np.ptp(mesh.vertices, axis=0).max())
-    return dressed(template, model, mesh, measures, looks, {}, scale)
+    return assemble_object(template, model, mesh, measures, looks, {}, scale)

@@ -10,19 +10,19 @@ import numpy as np
 import trimesh
 from trimesh.visual import TextureVisuals
 
-from manitwin.formats.meshes.triangles import with_creased_normals
+from manitwin.formats.meshes.shading_normals import with_creased_normals
 from manitwin.models.generators.photo_material import photo_material
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.fitting.fit import Fitted
-from manitwin.models.generators.templates.fitting.texturing import Shot, Textured, textured
-from manitwin.models.generators.templates.fitting.view import of_turned
-from manitwin.models.generators.templates.known import known_of
-from manitwin.models.generators.templates.made import given_parts
+from manitwin.models.generators.templates.fitting.fit import TemplateFit
+from manitwin.models.generators.templates.fitting.texturing import FittedPhoto, TexturedSolid, texture_solid
+from manitwin.models.generators.templates.fitting.view import apply_yaw
+from manitwin.models.generators.templates.ground_truth import object_import_record
 from manitwin.models.generators.templates.template import Vector
+from manitwin.models.generators.templates.template_object import given_parts
 from manitwin.twin.import_record import FITTED, ImportRecord
 
 
-def with_its_front_seen(fitted: Fitted) -> Fitted:
+def rotate_front_to_camera(fitted: TemplateFit) -> TemplateFit:
     """Return the fit of an upright object without a natural front, rotated so that its visible side is towards -Y."""
     if not load_templates()[fitted.category].any_front or not fitted.upright:
         return fitted
@@ -33,22 +33,22 @@ def with_its_front_seen(fitted: Fitted) -> Fitted:
         x, y, z = (turn @ vector).tolist()
         return (x, y, z)
 
-    view, vertices = of_turned(fitted.view, made.mesh.vertices)
+    view, vertices = apply_yaw(fitted.view, made.mesh.vertices)
     points = [replace(p, position_m=turned(p.position_m), direction=turned(p.direction)) for p in made.points]
     solids = [(solid.rotate((0, 0, float(np.degrees(yaw_rad)))), density) for solid, density in made.solids]
     mesh = replace(made.mesh, vertices=vertices)
     return replace(fitted, made=replace(made, mesh=mesh, points=tuple(points), solids=solids), view=view)
 
 
-def texture_of(fitted: Sequence[Fitted], photos: Sequence[np.ndarray]) -> Textured:
+def texture_fit(fitted: Sequence[TemplateFit], photos: Sequence[np.ndarray]) -> TexturedSolid:
     """Return the solid fitted to photos ``(H, W, 4) uint8``, textured from the photo that shows each face best."""
     made = fitted[0].made
     colours = {part: look.rgb for part, look in made.looks.items()}
-    shots = [Shot(fit.view, rgba, fit.center_px, fit.box_px) for fit, rgba in zip(fitted, photos, strict=True)]
-    return textured(made.mesh, shots, colours)
+    shots = [FittedPhoto(fit.view, rgba, fit.center_px, fit.box_px) for fit, rgba in zip(fitted, photos, strict=True)]
+    return texture_solid(made.mesh, shots, colours)
 
 
-def visual_part(surface: Textured) -> trimesh.Trimesh:
+def visual_part(surface: TexturedSolid) -> trimesh.Trimesh:
     """Return the mesh in the object frame with its texture."""
     vertices, faces, uv = surface.mesh()
     material = photo_material(surface.texture)
@@ -57,12 +57,12 @@ def visual_part(surface: Textured) -> trimesh.Trimesh:
     return with_creased_normals(mesh)
 
 
-def known_of_fitted(fitted: Fitted, name: str, surface: Textured) -> ImportRecord:
+def fit_import_record(fitted: TemplateFit, name: str, surface: TexturedSolid) -> ImportRecord:
     """Return the import record of a fitted object with its texture: category, parts and functional points.
 
     The mass is omitted, since a photo determines neither size nor material.
     """
-    known = known_of(fitted.made, name)
+    known = object_import_record(fitted.made, name)
     return known.model_copy(
         update={
             "format": FITTED,
@@ -76,7 +76,7 @@ def known_of_fitted(fitted: Fitted, name: str, surface: Textured) -> ImportRecor
     )
 
 
-def notes_of(fitted: Fitted) -> dict[str, Any]:
+def fit_notes(fitted: TemplateFit) -> dict[str, Any]:
     """Return how the shape was found, for the record."""
     view, residual = fitted.view, fitted.residual
     return {

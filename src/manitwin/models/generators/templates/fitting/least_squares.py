@@ -13,14 +13,14 @@ import numpy as np
 
 from manitwin.models.generators.templates.fitting.evidence import Evidence
 from manitwin.models.generators.templates.fitting.residual import outline_difference
-from manitwin.models.generators.templates.fitting.shape import MOST_SPREADS, CoarseSolid, Family
+from manitwin.models.generators.templates.fitting.shape import MOST_SPREADS, CoarseSolid, ShapeFamily
 from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View
 
 _UPRIGHT_ROLL_RAD, _FREE_ROLL_RAD = np.radians(6.0), np.radians(60.0)
 _PRIOR = 0.15  # weight of one standard deviation of a prior, in units of the contour residual
 _FIRST_DAMPING, _LEAST_DAMPING = 0.02, 1e-3
 _TRIES = 4
-ENOUGH = 0.98
+CONVERGED_RATIO = 0.98
 _KEPT_ROUNDS = 3
 # Steps of a pixel or two; shorter ones would follow the pixel grid.
 _SPREAD_STEP = 0.35
@@ -29,7 +29,7 @@ _POSE = len(_POSE_STEPS)
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedView:
     """A view of a photo; ``upright`` means that the camera was not rolled, so that its roll is near zero."""
 
     view: View
@@ -39,15 +39,21 @@ class Placed:
 class Problem:
     """Least squares problem of one family of shapes and one or several photos of the same object."""
 
-    def __init__(self, family: Family, evidences: Sequence[Evidence], turns: bool):
+    def __init__(self, family: ShapeFamily, evidences: Sequence[Evidence], turns: bool):
         """Take the family, the evidence of the photos, and whether a rotation about the vertical changes no silhouette."""
         self._family, self._evidences, self._turns = family, list(evidences), turns
         usual = [np.clip(each.perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE) for each in evidences]
         self._usual = [float(np.log(perspective)) for perspective in usual]
 
     def solve(
-        self, spreads: np.ndarray, placed: Sequence[Placed], *, measures: bool, rounds: int, enough: float = ENOUGH
-    ) -> tuple[np.ndarray, list[Placed]]:
+        self,
+        spreads: np.ndarray,
+        placed: Sequence[PlacedView],
+        *,
+        measures: bool,
+        rounds: int,
+        enough: float = CONVERGED_RATIO,
+    ) -> tuple[np.ndarray, list[PlacedView]]:
         """Return measures (unchanged unless ``measures``) and a view per photo, starting from the given ones.
 
         Stops after ``rounds`` iterations, or after one that leaves more than ``enough`` of the previous sum of squares.
@@ -56,7 +62,7 @@ class Problem:
         if solid is None:
             return spreads, list(placed)
         count = len(spreads) if measures else 0
-        state = _State(self, spreads, placed, count)
+        state = _Linearization(self, spreads, placed, count)
         at = np.concatenate([spreads[:count], *(_encoded(each.view) for each in placed)])
         value = state.residuals(at, solid)
         jacobian = np.zeros((len(value), len(at)))
@@ -66,8 +72,8 @@ class Problem:
             gram, slope, before = jacobian.T @ jacobian, jacobian.T @ value, float(value @ value)
             for _ in range(_TRIES):
                 change = -np.linalg.solve(gram + damping * np.diag(np.diag(gram)) + 1e-9 * np.eye(len(at)), slope)
-                trial = _bounded(at + change, count)
-                tried = state.built(trial)
+                trial = _clip_parameters(at + change, count)
+                tried = state.solid_at(trial)
                 other = None if tried is None else state.residuals(trial, tried)
                 if tried is not None and other is not None and float(other @ other) < before:
                     at, value, solid, damping = trial, other, tried, max(damping / 3, _LEAST_DAMPING)
@@ -77,21 +83,21 @@ class Problem:
                 break
             if float(value @ value) > enough * before:
                 break
-        views = [Placed(_decoded(pose), each.upright) for pose, each in zip(_poses(at, count), placed, strict=True)]
+        views = [PlacedView(_decoded(pose), each.upright) for pose, each in zip(_poses(at, count), placed, strict=True)]
         return np.concatenate([at[:count], spreads[count:]]), views
 
 
-class _State:
+class _Linearization:
     """The residuals of a problem near one starting point, and their derivatives."""
 
-    def __init__(self, problem: Problem, spreads: np.ndarray, placed: Sequence[Placed], count: int):
+    def __init__(self, problem: Problem, spreads: np.ndarray, placed: Sequence[PlacedView], count: int):
         self._problem, self._spreads, self._count = problem, spreads, count
         self._rolls = [
             (0.0, _UPRIGHT_ROLL_RAD) if each.upright else (each.view.roll_rad, _FREE_ROLL_RAD) for each in placed
         ]
-        self._moves = problem._family.changes(spreads, _SPREAD_STEP) if count else []
+        self._moves = problem._family.vertex_displacements(spreads, _SPREAD_STEP) if count else []
 
-    def built(self, at: np.ndarray) -> CoarseSolid | None:
+    def solid_at(self, at: np.ndarray) -> CoarseSolid | None:
         return self._problem._family.solid(np.concatenate([at[: self._count], self._spreads[self._count :]]))
 
     def residuals(self, at: np.ndarray, solid: CoarseSolid) -> np.ndarray:
@@ -104,7 +110,7 @@ class _State:
             # Building a solid costs ten times as much as drawing it: columns of measures that change the faces are reused for
             # some rounds.
             if self._moves[k] is not None or number % _KEPT_ROUNDS == 0:
-                sides = [self._beside(at, solid, k, side) for side in (0, 1)]
+                sides = [self._perturbed_residuals(at, solid, k, side) for side in (0, 1)]
                 if sides[0] is not None and sides[1] is not None:
                     jacobian[:, k] = (sides[0] - sides[1]) / (2 * _SPREAD_STEP)
         poses = _poses(at, self._count)
@@ -116,12 +122,12 @@ class _State:
                 more, less = (self._block(photo, pose + sign * step, solid) for sign in (1.0, -1.0))
                 jacobian[rows, self._count + photo * _POSE + k] = (more - less) / (2 * _POSE_STEPS[k])
 
-    def _beside(self, at: np.ndarray, solid: CoarseSolid, k: int, side: int) -> np.ndarray | None:
+    def _perturbed_residuals(self, at: np.ndarray, solid: CoarseSolid, k: int, side: int) -> np.ndarray | None:
         moved, move = at.copy(), self._moves[k]
         moved[k] += _SPREAD_STEP * (1 - 2 * side)
         if move is not None and len(move[side]) == len(solid.vertices):
-            return self.residuals(moved, solid.reshaped(solid.vertices + move[side]))
-        other = self.built(moved)
+            return self.residuals(moved, solid.with_vertices(solid.vertices + move[side]))
+        other = self.solid_at(moved)
         return None if other is None else self.residuals(moved, other)
 
     def _block(self, number: int, pose: np.ndarray, solid: CoarseSolid) -> np.ndarray:
@@ -146,7 +152,7 @@ def _decoded(pose: np.ndarray) -> View:
     return View(yaw, elevation, roll, float(np.exp(perspective)), float(np.exp(scale)), x, y)
 
 
-def _bounded(at: np.ndarray, count: int) -> np.ndarray:
+def _clip_parameters(at: np.ndarray, count: int) -> np.ndarray:
     out = at.copy()
     out[:count] = np.clip(out[:count], -MOST_SPREADS, MOST_SPREADS)
     poses = _poses(out, count)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from manitwin.models.generators.templates.fitting.fit import fit, kinds_of, template_for
+from manitwin.models.generators.templates.fitting.fit import alternative_categories, fit, template_for
 
 MOST_OUTLINE, LEAST_IOU = 0.001, 0.9
 """Limits on the mean contour distance, relative to the box side, and on the overlap."""
@@ -20,7 +20,7 @@ def template_outline_check(name: str | None, focal_mm: float | None = None) -> C
     template = template_for(name)
     if template is None:
         return None
-    category, kinds = template.category, kinds_of(template.category, name)
+    category, kinds = template.category, alternative_categories(template.category, name)
 
     def explains(rgba: np.ndarray) -> bool:
         found = fit(category, rgba, or_of=kinds, focal_mm=focal_mm)

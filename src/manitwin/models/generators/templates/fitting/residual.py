@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from manitwin.models.generators.templates.fitting.drawing import seen_faces, silhouette, to_pixels
+from manitwin.models.generators.templates.fitting.drawing import silhouette, to_pixels, visible_faces
 from manitwin.models.generators.templates.fitting.evidence import (
     BOX_SHARE,
-    FINE,
+    OVERSAMPLING,
     REACH,
     SIDE_PX,
     Evidence,
@@ -59,8 +59,10 @@ class Residual:
 def outline_difference(solid: CoarseSolid, view: View, evidence: Evidence) -> np.ndarray:
     """Return the differences ``(N,)`` of the signed distances to both contours, the residual vector of the fit."""
     flat, _ = view.project(solid.vertices)
-    drawn = silhouette(to_pixels(flat, FINE * SIDE_PX, BOX_SHARE), solid.faces, solid.edges, FINE * SIDE_PX)
-    seen = evidence.compared_with(perforated=solid.perforated)
+    drawn = silhouette(
+        to_pixels(flat, OVERSAMPLING * SIDE_PX, BOX_SHARE), solid.faces, solid.edges, OVERSAMPLING * SIDE_PX
+    )
+    seen = evidence.for_comparison(perforated=solid.perforated)
     return np.asarray((signed_distance(drawn) - seen.outline).ravel())
 
 
@@ -72,10 +74,10 @@ def iou(mask: np.ndarray, evidence: Evidence) -> float:
 
 def residual(solid: CoarseSolid, view: View, evidence: Evidence) -> Residual:
     """Return the residual of a solid under a view."""
-    evidence = evidence.compared_with(perforated=solid.perforated)
+    evidence = evidence.for_comparison(perforated=solid.perforated)
     flat, distance = view.project(solid.vertices)
-    pixels = to_pixels(flat, FINE * SIDE_PX, BOX_SHARE)
-    face = seen_faces(pixels, distance, solid.faces, FINE * SIDE_PX)[::FINE, ::FINE]
+    pixels = to_pixels(flat, OVERSAMPLING * SIDE_PX, BOX_SHARE)
+    face = visible_faces(pixels, distance, solid.faces, OVERSAMPLING * SIDE_PX)[::OVERSAMPLING, ::OVERSAMPLING]
     drawn = silhouette(to_pixels(flat, SIDE_PX, BOX_SHARE), solid.faces, solid.edges, SIDE_PX)
     normals = (solid.normals @ view.object_to_camera.T).astype(np.float32)[face]
     part = np.where(face >= 0, solid.part[face], -1)
@@ -84,7 +86,7 @@ def residual(solid: CoarseSolid, view: View, evidence: Evidence) -> Residual:
         iou=iou(drawn, evidence),
         outline=_outline_distance(drawn, evidence),
         edges=edges,
-        shading=_unexplained(normals, part, drawn, evidence),
+        shading=_unexplained_shading(normals, part, drawn, evidence),
         hidden=_hidden(solid, part),
         edge_px=count,
     )
@@ -126,7 +128,7 @@ def _edges(normals: np.ndarray, part: np.ndarray, drawn: np.ndarray, evidence: E
     return (count * missing + _LEAST_EDGE_PX * 0.7) / (count + _LEAST_EDGE_PX), count
 
 
-def _unexplained(normals: np.ndarray, part: np.ndarray, drawn: np.ndarray, evidence: Evidence) -> float:
+def _unexplained_shading(normals: np.ndarray, part: np.ndarray, drawn: np.ndarray, evidence: Evidence) -> float:
     """Return the share of the colour variation that remains after a linear model of the normals per part."""
     both = ((drawn > 0) & evidence.inner)[::2, ::2]
     colours = evidence.lab[::2, ::2][both].astype(np.float64) * (_LIGHTNESS_SHARE, 1.0, 1.0)

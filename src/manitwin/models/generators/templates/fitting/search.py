@@ -13,21 +13,21 @@ import numpy as np
 
 from manitwin.models.generators.templates.fitting.drawing import silhouette, to_pixels
 from manitwin.models.generators.templates.fitting.evidence import BOX_SHARE, SIDE_PX, Evidence
-from manitwin.models.generators.templates.fitting.least_squares import ENOUGH, Placed, Problem
+from manitwin.models.generators.templates.fitting.least_squares import CONVERGED_RATIO, PlacedView, Problem
 from manitwin.models.generators.templates.fitting.residual import Residual, iou, residual
-from manitwin.models.generators.templates.fitting.shape import CoarseSolid, Family
-from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View, boxed
+from manitwin.models.generators.templates.fitting.shape import CoarseSolid, ShapeFamily
+from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View, frame_placement
 
 ELEVATIONS_DEG = (4.0, 20.0, 36.0, 54.0, 78.0)
 YAWS = 12
 _ROUND_IOU = 0.985
-_TILTED_COST = 0.04  # in IoU: most objects are photographed at rest
+_ROLLED_COST = 0.04  # in IoU: most objects are photographed at rest
 _STARTS, _STARTS_OF_OTHERS = 7, 3
 _REFINED, _RIVALS = 2, 2
 _ROUNDS = 6
 _SETTLED_ROUNDS, _SETTLED_ENOUGH = 12, 0.9995
 """With an earlier stop, the measures from two image sizes of one photo differ by 3 %."""
-_OTHER_KIND_COST = 0.02
+_OTHER_CATEGORY_COST = 0.02
 _OTHER_MEASURES_COST = 0.005  # same category, other measures: resolves silhouette ambiguities
 _USUAL_ELEVATION_DEG, _STEEP_COST = 30.0, 0.0005  # per degree: standing objects are seldom seen from above
 
@@ -36,14 +36,14 @@ _USUAL_ELEVATION_DEG, _STEEP_COST = 30.0, 0.0005  # per degree: standing objects
 class Candidate:
     """A fit: measures of a family (in spreads), view, and residual; ``upright`` means that the camera was not rolled."""
 
-    family: Family
+    family: ShapeFamily
     spreads: np.ndarray
     view: View
     upright: bool
     residual: Residual
 
 
-def search(families: Sequence[Family], evidence: Evidence, *, settled: bool = False) -> list[Candidate]:
+def search(families: Sequence[ShapeFamily], evidence: Evidence, *, settled: bool = False) -> list[Candidate]:
     """Return fits to a photo, best first; empty if no usual measures give a solid.
 
     The first family is the named one. Other families must explain the photo better by a margin, which is smaller if only the
@@ -60,29 +60,29 @@ def search(families: Sequence[Family], evidence: Evidence, *, settled: bool = Fa
         turns = is_round(solid)
         problem = Problem(family, [evidence], turns)
         same_kind = family.template is families[0].template
-        for start, upright in grid(solid, evidence, turns)[: _STARTS if same_kind else _STARTS_OF_OTHERS]:
-            _, (placed,) = problem.solve(spreads, [Placed(start, upright)], measures=False, rounds=2)
+        for start, upright in rank_views(solid, evidence, turns)[: _STARTS if same_kind else _STARTS_OF_OTHERS]:
+            _, (placed,) = problem.solve(spreads, [PlacedView(start, upright)], measures=False, rounds=2)
             view = placed.view
-            cost = residual(solid, view, evidence).cost + _prejudice(family, families[0], view, upright)
+            cost = residual(solid, view, evidence).cost + _prior_penalty(family, families[0], view, upright)
             found.append(_Start(cost, number, problem, view, upright))
             if upright and np.degrees(start.elevation_rad) < _USUAL_ELEVATION_DEG:
                 usual.setdefault(number, _Start(cost, number, problem, start, upright))
     found.sort(key=lambda each: (each.cost, each.number))
     candidates = []
-    for chosen in _refined(found, usual):
+    for chosen in _select_starts(found, usual):
         family, upright = families[chosen.number], chosen.upright
-        begin = [Placed(chosen.view, upright)]
+        begin = [PlacedView(chosen.view, upright)]
         at, (placed,) = chosen.problem.solve(
             np.zeros(len(family.free)),
             begin,
             measures=True,
             rounds=_SETTLED_ROUNDS if settled else _ROUNDS,
-            enough=_SETTLED_ENOUGH if settled else ENOUGH,
+            enough=_SETTLED_ENOUGH if settled else CONVERGED_RATIO,
         )
         view, final = placed.view, family.solid(at)
         if final is not None:
             left = residual(final, view, evidence)
-            cost = left.cost + _prejudice(family, families[0], view, upright)
+            cost = left.cost + _prior_penalty(family, families[0], view, upright)
             candidates.append((cost, Candidate(family, at, view, upright, left)))
     return [candidate for _, candidate in sorted(candidates, key=lambda each: each[0])]
 
@@ -98,7 +98,7 @@ class _Start:
     upright: bool
 
 
-def _refined(found: list[_Start], usual: dict[int, _Start]) -> list[_Start]:
+def _select_starts(found: list[_Start], usual: dict[int, _Start]) -> list[_Start]:
     """Return the starts to refine with measures: the best of the named family, the best of each close rival, and the usual view.
 
     An object of unusual proportions looks like a usual one seen from higher up, so the best view alone does not suffice.
@@ -117,13 +117,13 @@ def steep_cost(view: View) -> float:
     return _STEEP_COST * max(0.0, float(np.degrees(view.elevation_rad)) - _USUAL_ELEVATION_DEG)
 
 
-def _prejudice(family: Family, said: Family, view: View, upright: bool) -> float:
+def _prior_penalty(family: ShapeFamily, said: ShapeFamily, view: View, upright: bool) -> float:
     """Return the penalty for an unusual view, another category, or other expected measures."""
     rare = steep_cost(view) if family.stands and upright else 0.0
-    other = 0.0 if family is said else _OTHER_KIND_COST
+    other = 0.0 if family is said else _OTHER_CATEGORY_COST
     if family is not said and family.template is said.template:
         other = _OTHER_MEASURES_COST
-    return rare + (0.0 if upright else _TILTED_COST) + other
+    return rare + (0.0 if upright else _ROLLED_COST) + other
 
 
 def is_round(solid: CoarseSolid) -> bool:
@@ -137,9 +137,9 @@ def is_round(solid: CoarseSolid) -> bool:
     return min(shared) > _ROUND_IOU
 
 
-def grid(solid: CoarseSolid, evidence: Evidence, turns: bool) -> list[tuple[View, bool]]:
+def rank_views(solid: CoarseSolid, evidence: Evidence, turns: bool) -> list[tuple[View, bool]]:
     """Return views ranked by silhouette overlap with the photo, best first, each with whether the camera is upright."""
-    evidence = evidence.compared_with(perforated=solid.perforated)
+    evidence = evidence.for_comparison(perforated=solid.perforated)
     lean = principal_angle(evidence.mask)
     scored: list[tuple[float, View, bool]] = []
     perspective = float(np.clip(evidence.perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE))
@@ -147,20 +147,20 @@ def grid(solid: CoarseSolid, evidence: Evidence, turns: bool) -> list[tuple[View
         for yaw in [0.0] if turns else np.arange(YAWS) * 2 * np.pi / YAWS:
             upright = View(float(yaw), float(elevation), 0.0, perspective)
             flat, _ = upright.project(solid.vertices)
-            scale, x, y = boxed(flat)
+            scale, x, y = frame_placement(flat)
             mask = silhouette(to_pixels(flat * scale + (x, y), SIDE_PX, BOX_SHARE), solid.faces, solid.edges, SIDE_PX)
             scored.append((iou(mask, evidence), replace(upright, scale=scale, x=x, y=y), True))
             turn = lean - principal_angle(mask > 0)
             for roll in (turn, turn + np.pi):
                 rolled = replace(upright, roll_rad=float((roll + np.pi) % (2 * np.pi) - np.pi))
-                scale_r, x_r, y_r = boxed(rolled.project(solid.vertices)[0])
+                scale_r, x_r, y_r = frame_placement(rolled.project(solid.vertices)[0])
                 placed = replace(rolled, scale=scale_r, x=x_r, y=y_r)
-                turned = _turned(mask, replace(upright, scale=scale, x=x, y=y), placed)
-                scored.append((iou(turned, evidence) - _TILTED_COST, placed, False))
+                turned = _warp_mask(mask, replace(upright, scale=scale, x=x, y=y), placed)
+                scored.append((iou(turned, evidence) - _ROLLED_COST, placed, False))
     scored.sort(key=lambda each: -each[0])
     kept: list[tuple[View, bool]] = []
     for _, view, rests in scored:
-        if all(_apart(view, other) for other, _ in kept):
+        if all(_is_distinct_view(view, other) for other, _ in kept):
             kept.append((view, rests))
         if len(kept) == _STARTS:
             break
@@ -173,7 +173,7 @@ def principal_angle(mask: np.ndarray) -> float:
     return 0.5 * float(np.arctan2(2 * moments["mu11"], moments["mu20"] - moments["mu02"]))
 
 
-def _turned(mask: np.ndarray, before: View, after: View) -> np.ndarray:
+def _warp_mask(mask: np.ndarray, before: View, after: View) -> np.ndarray:
     """Return the mask of one view warped to another that differs only in roll, scale and position."""
     turn = after.roll_rad - before.roll_rad
     ratio = after.scale / before.scale
@@ -183,5 +183,5 @@ def _turned(mask: np.ndarray, before: View, after: View) -> np.ndarray:
     return np.asarray(cv2.warpAffine(mask, np.column_stack([matrix, shift]), mask.shape, flags=cv2.INTER_NEAREST))
 
 
-def _apart(one: View, other: View) -> bool:
+def _is_distinct_view(one: View, other: View) -> bool:
     return float(np.trace(one.object_to_camera @ other.object_to_camera.T)) < 1 + 2 * np.cos(np.radians(12.0))

@@ -9,7 +9,7 @@ import numpy as np
 
 from manitwin.geometry.solids.parts import PartedMesh
 from manitwin.geometry.solids.shapes import SolidError, coarser
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import find_prior
 from manitwin.models.generators.templates.fitting.drawing import edges_between
 from manitwin.models.generators.templates.fitting.view import normalised
 from manitwin.models.generators.templates.template import Template
@@ -56,12 +56,12 @@ class CoarseSolid:
         a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
         return np.cross(b - a, c - a)
 
-    def reshaped(self, vertices: np.ndarray) -> CoarseSolid:
+    def with_vertices(self, vertices: np.ndarray) -> CoarseSolid:
         """Return the same faces with other normalized vertices."""
         return replace(self, vertices=vertices)
 
 
-class Family:
+class ShapeFamily:
     """The shapes of a template. A photo does not determine the size: the first length keeps its expected value, the
     others vary.
     """
@@ -69,9 +69,9 @@ class Family:
     def __init__(self, template: Template, initial: Mapping[str, float] | None = None):
         """Take the template, and expected measures that replace the typical ones."""
         self.template = template
-        prior = lookup(template.category)
+        prior = find_prior(template.category)
         self.stands = prior is not None and prior.stands is True
-        expected = template.typical() | {
+        expected = template.typical_measures() | {
             name: value for name, value in (initial or {}).items() if name in template.measures
         }
         lengths = [name for name in template.measures if template.measures[name].unit == "m"]
@@ -99,7 +99,7 @@ class Family:
             self._made[key] = self._build(np.array(key))
         return self._made[key]
 
-    def changes(self, spreads: np.ndarray, step: float) -> list[tuple[np.ndarray, np.ndarray] | None]:
+    def vertex_displacements(self, spreads: np.ndarray, step: float) -> list[tuple[np.ndarray, np.ndarray] | None]:
         """Return the vertex displacements when each measure grows and shrinks by ``step`` spreads.
 
         None for a measure whose change alters the faces, such as the number of chords; the solid must then be rebuilt.

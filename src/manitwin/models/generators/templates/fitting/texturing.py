@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.solids.parts import PartedMesh
-from manitwin.models.generators.bleeding import bled
+from manitwin.models.generators.bleeding import bleed_colours
 from manitwin.models.generators.templates.fitting.view import View, normalised
 
 TEXTURE_PX, MOST_WIDTH_PX = 1024, 4096
@@ -35,7 +35,7 @@ _MARGIN = 0.05
 
 
 @dataclass(frozen=True)
-class Shot:
+class FittedPhoto:
     """A photo ``rgba (H, W, 4) uint8`` and its view; ``center_px`` and ``box_px`` place the photo frame in it."""
 
     view: View
@@ -45,7 +45,7 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class Textured:
+class TexturedSolid:
     """A refined solid: ``vertices (V, 3)`` m, ``faces (F, 3)``, ``uv (F, 3, 2)`` (v upward), ``texture (H, W, 3) uint8``.
 
     ``seen (F,)`` says whether a photo shows a face, ``part (F,)`` which part it belongs to.
@@ -72,14 +72,16 @@ class Textured:
         return float(areas[~self.seen].sum() / areas.sum())
 
 
-def textured(mesh: PartedMesh, shots: Sequence[Shot], colours: Mapping[str, tuple[float, float, float]]) -> Textured:
+def texture_solid(
+    mesh: PartedMesh, shots: Sequence[FittedPhoto], colours: Mapping[str, tuple[float, float, float]]
+) -> TexturedSolid:
     """Texture a solid from photos, each face from the photo that faces it most directly.
 
     ``colours`` (sRGB, 0..1) are used for parts that no photo shows.
     """
-    fine = refined(mesh)
+    fine = subdivide_mesh(mesh)
     points, center, half = normalised(fine.vertices)
-    cosines = np.array([_seen(points, fine, shot.view) for shot in shots])
+    cosines = np.array([_visible_cosines(points, fine, shot.view) for shot in shots])
     best, seen = cosines.argmax(axis=0), cosines.max(axis=0) > 0
     side_px = min(TEXTURE_PX, MOST_WIDTH_PX // len(shots))
     pictures, places, shown = [], np.zeros((*fine.faces.shape, 2)), np.zeros((len(fine.faces), 3), np.float32)
@@ -95,8 +97,8 @@ def textured(mesh: PartedMesh, shots: Sequence[Shot], colours: Mapping[str, tupl
         left += photo.shape[1]
     tones = _unseen_colours(points + center / half, fine, seen, shown, colours)
     cells, cell_uv = _charts(points, fine, ~seen, tones)
-    texture, uv = _laid_out(_side_by_side(pictures), places, cells, cell_uv)
-    return Textured(fine.vertices, fine.faces, uv, texture, seen, fine.part)
+    texture, uv = _place_charts(_side_by_side(pictures), places, cells, cell_uv)
+    return TexturedSolid(fine.vertices, fine.faces, uv, texture, seen, fine.part)
 
 
 def _side_by_side(pictures: Sequence[np.ndarray]) -> np.ndarray:
@@ -105,7 +107,7 @@ def _side_by_side(pictures: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate(rows, axis=1)
 
 
-def refined(mesh: PartedMesh) -> PartedMesh:
+def subdivide_mesh(mesh: PartedMesh) -> PartedMesh:
     """Return the same solid without long edges."""
     half = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0))) / 2
     solid = Manifold(
@@ -124,7 +126,7 @@ def refined(mesh: PartedMesh) -> PartedMesh:
     )
 
 
-def _seen(points: np.ndarray, mesh: PartedMesh, view: View) -> np.ndarray:
+def _visible_cosines(points: np.ndarray, mesh: PartedMesh, view: View) -> np.ndarray:
     """Return the cosine ``(F,)`` of the viewing angle of each face, 0 if it is not completely visible."""
     solid = trimesh.Trimesh(points, mesh.faces, process=False)
     caster, eye = RayCaster(solid), view.camera_position
@@ -157,7 +159,7 @@ def _crop(rgba: np.ndarray, side_px: int) -> tuple[np.ndarray, np.ndarray, float
     if scale < 1:
         size = (round(box.shape[1] * scale), round(box.shape[0] * scale))
         box = cv2.resize(box, size, interpolation=cv2.INTER_AREA)
-    return bled(np.ascontiguousarray(box[..., :3]), box[..., 3] > 200), np.array([left, top]), scale
+    return bleed_colours(np.ascontiguousarray(box[..., :3]), box[..., 3] > 200), np.array([left, top]), scale
 
 
 def _sampled(photo: np.ndarray, pixels: np.ndarray) -> np.ndarray:
@@ -198,7 +200,7 @@ def _unseen_colours(
             tones[wanted] = shown_as.get(colours[name], 255 * np.array(colours[name]))
             continue
         some, there = of_face[known], centers[known]
-        places = _across(centers) if _is_turned(centers[own]) else centers
+        places = _radius_and_height(centers) if _is_turned(centers[own]) else centers
         count = min(len(some), max(_NEAREST, len(some) // 8))
         quiet = _nearest_medians(some, cKDTree(places[known]), places[wanted], count)
         # Blend the colours at the border of the seen region.
@@ -234,7 +236,7 @@ def _is_turned(centers: np.ndarray) -> bool:
     return float(np.median([np.ptp(group) for group in groups])) < _ROUND_SPREAD
 
 
-def _across(centers: np.ndarray) -> np.ndarray:
+def _radius_and_height(centers: np.ndarray) -> np.ndarray:
     """Return radius and height ``(N, 2)``, which identify points of one ring."""
     return np.column_stack([np.hypot(centers[:, 0], centers[:, 1]), centers[:, 2]])
 
@@ -272,7 +274,7 @@ def _charts(
     return cells, places
 
 
-def _laid_out(
+def _place_charts(
     photo: np.ndarray, at: np.ndarray, cells: list[np.ndarray], places: dict[int, tuple[int, np.ndarray]]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Place the charts beside the photo, whose face corners are ``at (F, 3, 2)``; return the image and the uv coordinates."""

@@ -65,7 +65,7 @@ def normalised(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     return (vertices - center) / half, center, half
 
 
-def boxed(flat: np.ndarray) -> tuple[float, float, float]:
+def frame_placement(flat: np.ndarray) -> tuple[float, float, float]:
     """Return scale and shift that bring points ``(N, 2)`` into the photo frame: longer side 1, centred."""
     low, high = flat.min(axis=0), flat.max(axis=0)
     scale = 1.0 / float((high - low).max())
@@ -73,7 +73,7 @@ def boxed(flat: np.ndarray) -> tuple[float, float, float]:
     return scale, float(x), float(y)
 
 
-def of_turned(view: View, vertices: np.ndarray) -> tuple[View, np.ndarray]:
+def apply_yaw(view: View, vertices: np.ndarray) -> tuple[View, np.ndarray]:
     """Return vertices ``(V, 3)`` rotated about Z by a view's yaw, and the equivalent view without yaw.
 
     The rotated vertices have another box, to which a view is relative; the resulting shift along the line of sight is neglected.
