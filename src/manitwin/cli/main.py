@@ -6,7 +6,6 @@ Exit status: 0 all accepted, 3 some rejected, 4 some unfinished and resumable, 2
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import sys
@@ -61,7 +60,7 @@ from manitwin.cli.documents import (
 )
 from manitwin.cli.interrupt import Interrupts
 from manitwin.cli.lazy_help import only_asked_for
-from manitwin.cli.machine_limits import machine_error_message
+from manitwin.cli.machine_limits import RESUMABLE_STATUS, USAGE_STATUS, machine_error_message
 from manitwin.cli.option_values import SHELLS
 from manitwin.cli.reporting import LOG, Quiet, Verbose, set_global_verbosity, with_reporting_options
 from manitwin.cli.run_log import end_log
@@ -77,8 +76,6 @@ TYPER_INTERRUPTED = 130
 """What typer returns where it caught a KeyboardInterrupt by itself."""
 LONGEST_LINE = 1500
 """An error quotes what was given, which may be of any length: more characters are left out in the middle."""
-LASTING_CAUSES = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE})
-"""What ails the machine and not the command: what is done stays, and the same command goes on from there."""
 
 _interrupts = Interrupts()
 app = typer.Typer(
@@ -184,9 +181,10 @@ def _report_error(error: Exception) -> tuple[int, str]:
         message = getattr(error, "format_message", error.__str__)()
         message = f"{_shown(message).removesuffix('.')}{'' if message.endswith('?') else '.'} See {path} --help"
     else:
-        message = _shown(_os_error_message(error) if isinstance(error, OSError) else str(error))
-    lasting = isinstance(error, OSError) and error.errno in LASTING_CAUSES
-    status = 4 if lasting or isinstance(error, BackendError) else 2
+        message = _shown(str(error))
+    status = RESUMABLE_STATUS if isinstance(error, BackendError) else USAGE_STATUS
+    if isinstance(error, OSError):
+        message, status = _os_error_message(error)
     if is_json_requested(error):
         print_failure(error, message, status)
     return status, f"{path}: {message}"
@@ -196,11 +194,13 @@ def _shown(message: str) -> str:
     return printable_line(" ".join(message.split()), max_characters=LONGEST_LINE)
 
 
-def _os_error_message(error: OSError) -> str:
-    """Return one line of what the system refused, which nothing below this border has told in words of its own."""
+def _os_error_message(error: OSError) -> tuple[str, int]:
+    """Return one line for what the system refused and no other part of the program has explained, and the exit status."""
+    known = machine_error_message(error)
+    if known is not None:
+        return _shown(known[0]), known[1]
     named = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else "a file"
-    remedy = "free disk space, and rerun the same command" if error.errno in LASTING_CAUSES else "check the path"
-    return f"{named}: {error.strerror or error}; {remedy}"
+    return _shown(f"{named}: {error.strerror or error}; check the path"), USAGE_STATUS
 
 
 def _run() -> int:

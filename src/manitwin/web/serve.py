@@ -68,7 +68,7 @@ def bound_socket(host: str, port: int) -> socket.socket:
 
 
 def _is_not_shutdown_message(record: logging.LogRecord) -> bool:
-    """Drop uvicorn's messages about requests that are cancelled at shutdown, which is intended."""
+    """Keep a log record unless it is about requests that are cancelled at shutdown, which is intended."""
     cancelled = record.exc_info is not None and isinstance(record.exc_info[1], asyncio.CancelledError)
     return not cancelled and not str(record.msg).startswith("Cancel %s running task(s)")
 

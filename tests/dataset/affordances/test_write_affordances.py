@@ -12,8 +12,11 @@ import trimesh
 
 from drawn_scenes import add_parts
 from manitwin.dataset.affordances.maps import surface_maps
-from manitwin.dataset.affordances.write import split_of, write_affordances
+from manitwin.dataset.affordances.write import splits_of, write_affordances
+from manitwin.dataset.catalog.groups import split_of
+from manitwin.dataset.index.tables import DESCRIPTOR_LENGTH
 from manitwin.errors import UsageError
+from manitwin.geometry.shape_descriptor import ShapeDescriptor
 from manitwin.robots import grippers
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.twin.dataset_root import twin_name
@@ -223,3 +226,19 @@ def test_maps_of_a_gripper_of_ones_own_are_made_with_its_file(tmp_path: Path) ->
     assert "give its file with --gripper" in without.left_out[identity]
     done = write_affordances(tmp_path / "set", tmp_path / "out", points=200, trials=12, grippers=[mine])
     assert (done.twins, done.left_out) == (1, {})
+
+
+def test_copies_are_in_one_split() -> None:
+    def shape(number: float) -> ShapeDescriptor:
+        return ShapeDescriptor(np.full(DESCRIPTOR_LENGTH, number, np.float32), 0.05)
+
+    # ten inputs, each built four times; of each further input the shape is that of another with a larger id
+    built = {f"{number:02d}": (f"input {number % 10}", shape(float(number % 10))) for number in range(40)}
+    alike = {f"x{number}": (f"copy {number}", shape(float(number))) for number in range(10)}
+    both = built | alike
+    splits = splits_of({k: v for k, (_, v) in both.items()}, {k: source for k, (source, _) in both.items()})
+    assert splits.keys() == both.keys()
+    for number in range(10):
+        copies = [f"{each:02d}" for each in range(number, 40, 10)]
+        assert {splits[each] for each in (*copies, f"x{number}")} == {split_of(copies[0])}
+    assert len(set(splits.values())) > 1

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from manitwin.cli import option_values, options
-from manitwin.cli.console import error_console, out_console
+from manitwin.cli.console import err_console, error_console, out_console
 from manitwin.cli.documents import Json, print_document
 
 _CAUSES_SHOWN = 20
@@ -175,7 +175,7 @@ def collect_draw(
 
     painter = choose_text_to_image(images, settings, out / ANSWERS)
     done = draw_pictures(
-        wanted, out, painter, settings, said=lambda line: error_console.print(line, markup=False, soft_wrap=True)
+        wanted, out, painter, settings, said=lambda line: err_console.print(line, markup=False, soft_wrap=True)
     )
     if json_:
         print_document(

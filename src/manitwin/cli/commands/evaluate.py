@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from manitwin.cli import option_values, options
-from manitwin.cli.console import error_console, out_console
+from manitwin.cli.console import err_console, out_console
 from manitwin.cli.documents import Json, print_document
 
 if TYPE_CHECKING:
@@ -118,5 +118,5 @@ def _report(what: str, dataset: str, clip: str | None, ulip: Path | None, seed: 
 
     models = Models(None if clip is None else _clip(clip), None if ulip is None else ClipFolder(ulip, points=True))
     return evaluate_generation(
-        dataset, models, seed=seed, on_twin=lambda twin_id: error_console.print(f"{twin_id}: compared with its input")
+        dataset, models, seed=seed, on_twin=lambda twin_id: err_console.print(f"{twin_id}: compared with its input")
     )

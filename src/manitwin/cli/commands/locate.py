@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from manitwin.cli import option_values, options
-from manitwin.cli.console import error_console
+from manitwin.cli.console import err_console
 from manitwin.cli.documents import Json, print_document
 from manitwin.cli.location_lines import print_frames, print_grasps, print_layout, print_size, print_thing
 from manitwin.cli.view_files import ViewFiles
@@ -185,4 +185,4 @@ def _print_located_objects(
 
 
 def _print_embedded_twin(twin_id: str) -> None:
-    error_console.print(f"{twin_id}: rendered and embedded; the result is cached", markup=False)
+    err_console.print(f"{twin_id}: rendered and embedded; the result is cached", markup=False)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from manitwin.cli import option_values, options
-from manitwin.cli.console import error_console, out_console, print_layout_notice
+from manitwin.cli.console import err_console, error_console, out_console, print_layout_notice
 from manitwin.cli.documents import Json, print_document
 
 CAPTION_CHARACTERS = 60
@@ -85,7 +85,7 @@ def search(
 
 
 def _print_embedded_twin(twin_id: str) -> None:
-    error_console.print(f"{twin_id}: rendered and embedded; the result is cached", markup=False)
+    err_console.print(f"{twin_id}: rendered and embedded; the result is cached", markup=False)
 
 
 def _cut(text: str) -> str:

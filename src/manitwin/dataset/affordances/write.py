@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from math import isfinite
 from pathlib import Path
@@ -18,19 +17,22 @@ from manitwin.dataset.affordances.baselines import baseline_scores, part_shares
 from manitwin.dataset.affordances.maps import SurfaceMaps, has_parts, surface_maps
 from manitwin.dataset.affordances.partnext import PartNextFolder
 from manitwin.dataset.affordances.report import affordances_page, sample_picture
+from manitwin.dataset.catalog.groups import SPLITS, assign_groups, split_of
+from manitwin.dataset.index.near_duplicates import near_duplicates_of
 from manitwin.dataset.report_page import Picture
 from manitwin.errors import TwinError, UsageError
 from manitwin.formats.output_folder import new_folder
+from manitwin.geometry.shape_descriptor import ShapeDescriptor
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import NO_PART
+from manitwin.twin.shape_file import compute_shape, read_shape
 from manitwin.twin.store import canonical_json
 
 POINTS, TRIALS = 2048, 200
 SHOWN = 24
 """Number of twins shown in the report."""
-SPLITS = (("train", 0.8), ("val", 0.1), ("test", 0.1))
 
 
 @dataclass(frozen=True)
@@ -45,14 +47,19 @@ class AffordanceSummary:
     median_area_under_curve: float | None
 
 
-def split_of(twin_id: str) -> str:
-    """Return the split of a twin by the digest of its id, independent of the rest of the data set."""
-    place = int.from_bytes(hashlib.sha256(twin_id.encode()).digest()[:8], "big") / 2**64
-    for name, share in SPLITS:
-        if place < share:
-            return name
-        place -= share
-    return SPLITS[-1][0]
+def splits_of(shapes: Mapping[str, ShapeDescriptor], sources: Mapping[str, str]) -> dict[str, str]:
+    """Return the split of each twin by its id, from shapes and digests of inputs by id.
+
+    Twins of one input, and near duplicates (``manitwin.near_duplicates``), are in one split, as in a catalog.
+    """
+    ids = sorted(shapes)
+    near = near_duplicates_of(
+        ids,
+        [sources[twin_id] for twin_id in ids],
+        np.array([shapes[twin_id].radius_of_gyration_m for twin_id in ids]),
+        np.array([shapes[twin_id].values for twin_id in ids]),
+    )
+    return {twin_id: split_of(group) for twin_id, group in assign_groups(ids, near).items()}
 
 
 def write_affordances(
@@ -84,10 +91,18 @@ def write_affordances(
     ]
     if not twins:
         raise UsageError(f"{dataset}: has no accepted twin; build twins, or give another data set")
+    shapes: dict[str, ShapeDescriptor] = {}
+    left_out: dict[str, str] = {}
+    for twin in twins:
+        try:
+            shapes[twin.record.twin_id] = read_shape(twin.folder) or compute_shape(twin.folder / "visual.glb")
+        except TwinError as error:
+            left_out[twin.record.twin_id] = str(error)
+    twins = [twin for twin in twins if twin.record.twin_id in shapes]
+    splits = splits_of(shapes, {twin.record.twin_id: twin.record.source.sha256 for twin in twins})
     kinds = sorted({f"{_category(twin)}/{part.name}" for twin in twins for part in twin.record.parts})
     part_ids = {name: number for number, name in enumerate(kinds)}
     rows: list[dict[str, object]] = []
-    left_out: dict[str, str] = {}
     samples: list[Picture] = []
     in_splits: dict[str, list[str]] = defaultdict(list)
     with new_folder(Path(out)) as folder, PartNextFolder(folder / "partnext") as partnext:
@@ -102,9 +117,9 @@ def write_affordances(
             if has_parts(maps):
                 category, name = category_folder(_category(twin)), twin.record.twin_id
                 _write(folder / "parts" / category / f"{name}.txt", parts_file(maps, part_ids))
-                in_splits[split_of(name)].append(f"shape_data/{category}/{name}")
+                in_splits[splits[name]].append(f"shape_data/{category}/{name}")
                 partnext.add(twin, category)
-            rows.append(_row(maps))
+            rows.append(_row(maps, splits[maps.twin.record.twin_id]))
             if len(samples) < SHOWN:
                 samples.append(sample_picture(maps))
         _write_part_lists(folder / "parts", sorted({category_folder(_category(twin)) for twin in twins}), in_splits)
@@ -180,11 +195,11 @@ def _write_part_lists(folder: Path, categories: list[str], in_splits: dict[str, 
         _write(file, json.dumps(sorted(in_splits.get(split, []))).encode())
 
 
-def _row(maps: SurfaceMaps) -> dict[str, object]:
+def _row(maps: SurfaceMaps, split: str) -> dict[str, object]:
     return {
         "twin_id": maps.twin.record.twin_id,
         "category": _category(maps.twin),
-        "split": split_of(maps.twin.record.twin_id),
+        "split": split,
         "maps": list(maps.maps),
         "tried": maps.tried,
         "held": maps.held,

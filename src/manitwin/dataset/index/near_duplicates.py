@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pyarrow as pa
 from scipy.spatial import cKDTree
 
 from manitwin.dataset.index.query import Index
@@ -53,13 +53,6 @@ def near_duplicates(
     labels are ignored. The descriptors are searched with a k-d tree, so time grows only slightly faster than the number of twins.
     """
     rows = index.select("twins", columns=["twin_id", "source_sha256", "radius_of_gyration_m", "shape_descriptor"])
-    same_source: dict[str, list[str]] = {}
-    for twin_id, source in zip(rows["twin_id"].to_pylist(), rows["source_sha256"].to_pylist(), strict=True):
-        same_source.setdefault(source, []).append(twin_id)
-    representatives = {ids[0] for ids in same_source.values()}
-    keep = np.array([twin_id in representatives for twin_id in rows["twin_id"].to_pylist()], bool)
-    rows = rows.filter(pa.array(keep))
-    ids = rows["twin_id"].to_pylist()
     shapes = (
         rows["shape_descriptor"]
         .combine_chunks()
@@ -67,8 +60,39 @@ def near_duplicates(
         .to_numpy(zero_copy_only=False)
         .reshape(-1, DESCRIPTOR_LENGTH)
     )
-    log_sizes = np.log(rows["radius_of_gyration_m"].to_numpy())
-    first, second, distance, ratio = _near_pairs(shapes, log_sizes, max_shape_distance, np.log(max_size_ratio))
+    return near_duplicates_of(
+        rows["twin_id"].to_pylist(),
+        rows["source_sha256"].to_pylist(),
+        rows["radius_of_gyration_m"].to_numpy(),
+        shapes,
+        max_shape_distance=max_shape_distance,
+        max_size_ratio=max_size_ratio,
+    )
+
+
+def near_duplicates_of(
+    twin_ids: Sequence[str],
+    sources: Sequence[str],
+    radii_m: np.ndarray,
+    descriptors: np.ndarray,
+    *,
+    max_shape_distance: float = MAX_SHAPE_DISTANCE,
+    max_size_ratio: float = MAX_SIZE_RATIO,
+) -> NearDuplicates:
+    """Find the near duplicates as ``near_duplicates`` does, among twins that are given.
+
+    ``twin_ids`` are sorted; ``sources`` are the digests of their inputs, ``radii_m (N,)`` their radii of gyration and
+    ``descriptors (N, DESCRIPTOR_LENGTH)`` their shape descriptors.
+    """
+    same_source: dict[str, list[str]] = {}
+    for twin_id, source in zip(twin_ids, sources, strict=True):
+        same_source.setdefault(source, []).append(twin_id)
+    representatives = {ids[0] for ids in same_source.values()}
+    keep = np.array([twin_id in representatives for twin_id in twin_ids], bool)
+    ids = [twin_id for twin_id in twin_ids if twin_id in representatives]
+    first, second, distance, ratio = _near_pairs(
+        descriptors[keep], np.log(radii_m[keep]), max_shape_distance, np.log(max_size_ratio)
+    )
     pairs = [
         NearPair(ids[a], ids[b], float(d), float(r)) for a, b, d, r in zip(first, second, distance, ratio, strict=True)
     ]

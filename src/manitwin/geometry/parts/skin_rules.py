@@ -139,13 +139,6 @@ def _crest(opening: Opening, corners_m: np.ndarray) -> tuple[np.ndarray, float]:
     return corners_m[mine], float(level.mean())
 
 
-def _shown_by_faces(rim: np.ndarray, graph: SurfaceGraph) -> bool:
-    """Return whether the mesh's own faces are small enough to represent a rim; a wall of one face from top to bottom is not."""
-    by_face = graph.labels_by_piece(graph.labels_by_face(rim))
-    both, either = (graph.areas_m2[which].sum() for which in (by_face & rim, by_face | rim))
-    return bool(both > 0.5 * either)
-
-
 _FLAT, _ROUNDED = 0.8, 0.35  # component of a normal along the axis: limits for vertical and sideways faces
 _MOST_ROUNDED = 0.2  # fraction of the area, in between; with more, the object has no faces bounded by edges
 _LEAST_FACE = 0.03  # fraction of the area

@@ -1,4 +1,4 @@
-"""Things that people wear and carry: glasses and watches, shoes and hats, a wallet, a lighter, a suitcase."""
+"""Accessories: glasses, watches, a wallet and a lighter."""
 
 from __future__ import annotations
 
