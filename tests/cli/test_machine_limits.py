@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from manitwin.cli import main
+from manitwin.cli.interrupt import Interrupts
 from manitwin.cli.machine_limits import machine_error_message, memory_limit_message
 from manitwin.cli.main import app
 from manitwin.errors import UsageError
@@ -75,6 +77,19 @@ def test_a_limit_of_file_sizes_is_one_line(tmp_path: Path) -> None:
 def test_what_the_machine_refuses_is_told_with_its_remedy(error: Exception, says: str, status: int) -> None:
     found = machine_error_message(error)
     assert found is not None and says in found[0] and found[1] == status
+
+
+def test_what_the_system_refuses_a_command_is_told_with_its_own_remedy(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused(*_: object) -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(main, "only_asked_for", refused)
+    monkeypatch.setattr(main, "_interrupts", Interrupts(), raising=False)
+    assert main._run() == 4
+    errors = capsys.readouterr().err
+    assert "ulimit -n" in errors and "disk space" not in errors and len(errors.splitlines()) == 1
 
 
 @pytest.mark.parametrize("error", [ValueError("x"), RuntimeError("x"), OSError("x"), ConnectionResetError(104, "x")])

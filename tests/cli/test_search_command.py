@@ -40,6 +40,10 @@ def test_words_and_a_picture_find_twins(dataset: Path, tmp_path: Path, monkeypat
     catalog = tmp_path / "catalog"
     assert "2 twins" in run("catalog", dataset, "-o", catalog, "--size", 96)
     picture = next(path for path in sorted(catalog.glob("pictures/knife-*/*_r_024.png")))
+    quiet = CliRunner().invoke(app, ["--quiet", "search", str(dataset), "--image", str(picture)])
+    assert quiet.exit_code == 0 and "embedded" not in quiet.output, (
+        "twins are embedded for the first time, without a word"
+    )
     found = json.loads(run("search", dataset, "--image", picture, "--json"))
     check_keys(found, "search")
     assert found["hits"][0]["category"] == "knife" and found["background"] == "border"

@@ -127,6 +127,11 @@ def print_layout_notice(root: DatasetRoot) -> None:
         err_console.print(f"{root.url}: uses the flat layout of earlier versions, which can be read but not extended")
 
 
+def print_embedded_twin(twin_id: str) -> None:
+    """Print that a twin was rendered and embedded for a search by picture."""
+    err_console.print(f"{twin_id}: rendered and embedded; the result is cached", markup=False)
+
+
 def print_error(message: str) -> None:
     """Say what went wrong with one of several things; ``--quiet`` does not leave it out."""
     error_console.print(message)

@@ -219,12 +219,7 @@ def _run() -> int:
             print_failure(error, _interrupts.message, _interrupts.status)
         _interrupts.print_message()
         return _interrupts.status
-    except (CommandLineError, ManiTwinError) as error:
-        LOG.debug("the error came from here", exc_info=error)
-        code, line = _report_error(error)
-        error_console.print(line, style="red")
-        return code
-    except OSError as error:
+    except (CommandLineError, ManiTwinError, OSError) as error:
         LOG.debug("the error came from here", exc_info=error)
         code, line = _report_error(error)
         error_console.print(line, style="red")

@@ -12,7 +12,8 @@ import trimesh
 
 from drawn_scenes import add_parts
 from manitwin.dataset.affordances.maps import surface_maps
-from manitwin.dataset.affordances.write import splits_of, write_affordances
+from manitwin.dataset.affordances.splits import split_twins, splits_of
+from manitwin.dataset.affordances.write import write_affordances
 from manitwin.dataset.catalog.groups import split_of
 from manitwin.dataset.index.tables import DESCRIPTOR_LENGTH
 from manitwin.errors import UsageError
@@ -242,3 +243,13 @@ def test_copies_are_in_one_split() -> None:
         copies = [f"{each:02d}" for each in range(number, 40, 10)]
         assert {splits[each] for each in (*copies, f"x{number}")} == {split_of(copies[0])}
     assert len(set(splits.values())) > 1
+
+
+def test_a_twin_whose_shape_is_damaged_is_left_out_with_the_reason(dataset: Path, tmp_path: Path) -> None:
+    shutil.copytree(dataset, tmp_path / "set")
+    twins = [Twin(path.parent) for path in sorted((tmp_path / "set").rglob("twin.json"))]
+    damaged = next(twin for twin in twins if twin.record.status == "accepted")
+    (damaged.folder / "shape.json").write_text("{")
+    splits, left_out = split_twins(twins)
+    assert set(left_out) == {damaged.record.twin_id} and "shape.json" in left_out[damaged.record.twin_id]
+    assert damaged.record.twin_id not in splits

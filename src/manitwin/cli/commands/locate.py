@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from manitwin.cli import option_values, options
-from manitwin.cli.console import err_console
+from manitwin.cli.console import print_embedded_twin
 from manitwin.cli.documents import Json, print_document
 from manitwin.cli.location_lines import print_frames, print_grasps, print_layout, print_size, print_thing
 from manitwin.cli.view_files import ViewFiles
@@ -138,9 +138,7 @@ def locate(
     grippers = [load_gripper(name) for name in gripper or ()]
     view, masks = files.read(seed)
     if one is None:
-        found = find_twins(
-            DatasetRoot(source), view, masks, model, tried=tried, seed=seed, on_twin=_print_embedded_twin
-        )
+        found = find_twins(DatasetRoot(source), view, masks, model, tried=tried, seed=seed, on_twin=print_embedded_twin)
     elif fit_size:
         found = find_twin_of_any_size(one, view, masks, seed)
     else:
@@ -182,7 +180,3 @@ def _print_located_objects(
         print_size(said.get("size"), grasps)
         print_grasps(said["grasps"])
         print_frames(said["functional"], said["placements"] if usable else None)
-
-
-def _print_embedded_twin(twin_id: str) -> None:
-    err_console.print(f"{twin_id}: rendered and embedded; the result is cached", markup=False)

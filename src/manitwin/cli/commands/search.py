@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from manitwin.cli import option_values, options
-from manitwin.cli.console import err_console, error_console, out_console, print_layout_notice
+from manitwin.cli.console import error_console, out_console, print_embedded_twin, print_layout_notice
 from manitwin.cli.documents import Json, print_document
 
 CAPTION_CHARACTERS = 60
@@ -58,7 +58,7 @@ def search(
         from manitwin.dataset.search.search import search_picture
         from manitwin.formats.image_file import read_image
 
-        hits, background = search_picture(root, read_image(image).pixels, limit=limit, on_twin=_print_embedded_twin)
+        hits, background = search_picture(root, read_image(image).pixels, limit=limit, on_twin=print_embedded_twin)
     else:
         from manitwin.config import ServicesConfig
         from manitwin.dataset.search.search import find_unknown_words, search_words
@@ -82,10 +82,6 @@ def search(
         out_console.print(f"{hit.score:8.3f}  {hit.twin_id}  {hit.category}: {_cut(hit.caption)}")
     if not hits:
         out_console.print("no twin matches these words")
-
-
-def _print_embedded_twin(twin_id: str) -> None:
-    err_console.print(f"{twin_id}: rendered and embedded; the result is cached", markup=False)
 
 
 def _cut(text: str) -> str:

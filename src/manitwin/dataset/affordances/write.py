@@ -6,7 +6,7 @@ import io
 import json
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass
 from math import isfinite
 from pathlib import Path
@@ -17,17 +17,15 @@ from manitwin.dataset.affordances.baselines import baseline_scores, part_shares
 from manitwin.dataset.affordances.maps import SurfaceMaps, has_parts, surface_maps
 from manitwin.dataset.affordances.partnext import PartNextFolder
 from manitwin.dataset.affordances.report import affordances_page, sample_picture
-from manitwin.dataset.catalog.groups import SPLITS, assign_groups, split_of
-from manitwin.dataset.index.near_duplicates import near_duplicates_of
+from manitwin.dataset.affordances.splits import split_twins
+from manitwin.dataset.catalog.groups import SPLITS
 from manitwin.dataset.report_page import Picture
 from manitwin.errors import TwinError, UsageError
 from manitwin.formats.output_folder import new_folder
-from manitwin.geometry.shape_descriptor import ShapeDescriptor
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import NO_PART
-from manitwin.twin.shape_file import compute_shape, read_shape
 from manitwin.twin.store import canonical_json
 
 POINTS, TRIALS = 2048, 200
@@ -47,21 +45,6 @@ class AffordanceSummary:
     median_area_under_curve: float | None
 
 
-def splits_of(shapes: Mapping[str, ShapeDescriptor], sources: Mapping[str, str]) -> dict[str, str]:
-    """Return the split of each twin by its id, from shapes and digests of inputs by id.
-
-    Twins of one input, and near duplicates (``manitwin.near_duplicates``), are in one split, as in a catalog.
-    """
-    ids = sorted(shapes)
-    near = near_duplicates_of(
-        ids,
-        [sources[twin_id] for twin_id in ids],
-        np.array([shapes[twin_id].radius_of_gyration_m for twin_id in ids]),
-        np.array([shapes[twin_id].values for twin_id in ids]),
-    )
-    return {twin_id: split_of(group) for twin_id, group in assign_groups(ids, near).items()}
-
-
 def write_affordances(
     dataset: str | Path,
     out: str | Path,
@@ -79,27 +62,9 @@ def write_affordances(
     user-defined grippers that twins were built with. Raises UsageError for a data set at a URL or without accepted twins, and for
     an ``out`` that is not empty.
     """
-    root = DatasetRoot(dataset)
-    if root.local is None:
-        raise UsageError(
-            f"{dataset}: is at a URL; copy the data set to this machine, since all files of its twins are read"
-        )
-    twins = [
-        twin
-        for each in root.twin_ids()
-        if (twin := Twin(root.local / root.twin_name(each))).record.status == "accepted"
-    ]
-    if not twins:
-        raise UsageError(f"{dataset}: has no accepted twin; build twins, or give another data set")
-    shapes: dict[str, ShapeDescriptor] = {}
-    left_out: dict[str, str] = {}
-    for twin in twins:
-        try:
-            shapes[twin.record.twin_id] = read_shape(twin.folder) or compute_shape(twin.folder / "visual.glb")
-        except TwinError as error:
-            left_out[twin.record.twin_id] = str(error)
-    twins = [twin for twin in twins if twin.record.twin_id in shapes]
-    splits = splits_of(shapes, {twin.record.twin_id: twin.record.source.sha256 for twin in twins})
+    accepted = _accepted_twins(dataset)
+    splits, left_out = split_twins(accepted)
+    twins = [twin for twin in accepted if twin.record.twin_id in splits]
     kinds = sorted({f"{_category(twin)}/{part.name}" for twin in twins for part in twin.record.parts})
     part_ids = {name: number for number, name in enumerate(kinds)}
     rows: list[dict[str, object]] = []
@@ -144,6 +109,19 @@ def write_affordances(
         median_similarity=None if sim is None else float(sim),
         median_area_under_curve=None if auc is None else float(auc),
     )
+
+
+def _accepted_twins(dataset: str | Path) -> list[Twin]:
+    root = DatasetRoot(dataset)
+    if root.local is None:
+        raise UsageError(
+            f"{dataset}: is at a URL; copy the data set to this machine, since all files of its twins are read"
+        )
+    twins = (Twin(root.local / root.twin_name(each)) for each in root.twin_ids())
+    accepted = [twin for twin in twins if twin.record.status == "accepted"]
+    if not accepted:
+        raise UsageError(f"{dataset}: has no accepted twin; build twins, or give another data set")
+    return accepted
 
 
 def maps_file(maps: SurfaceMaps) -> bytes:
